@@ -13,6 +13,7 @@ from components.alerting.alert_figure import draw_alerts
 from components.alerting.alert_tables import alert_table, bands_table, without_memory
 from components.alerting.encounter import Encounter, read_encounter
 from components.alerting.levels import Alerts, alert_levels
+from components.formats.recorded.traffic_of_files import Choice
 from components.formats.text_rows import SPEED_MPS, TrafficFileError
 from dsa_des.block.shipped_files import found_or_shipped
 from dsa_des.errors import OutputError, UsageError
@@ -43,6 +44,8 @@ def alert_files(
     figure: str | None,
     bands: str | None,
     wind: tuple[float, float] | None,
+    ownship: str | None,
+    own_file: str | None,
     decimals: int,
 ) -> None:
     """Write the tables and figures that the command line asks for."""
@@ -62,7 +65,9 @@ def alert_files(
     configuration = _read(Path(conf))
     if no_hysteresis:
         configuration = without_memory(configuration)
-    done = _alerts(configuration, paths, _wind_mps(wind))
+    own = None if own_file is None else Path(own_file)
+    choice = Choice(ownship=ownship, own_file=own)
+    done = _alerts(configuration, paths, _wind_mps(wind), choice)
     try:
         if several:
             _write_folders(configuration, done, places, decimals)
@@ -109,13 +114,16 @@ def _read(path: Path) -> Configuration:
 
 
 def _alerts(
-    configuration: Configuration, paths: list[Path], wind_mps: tuple[float, float] | None
+    configuration: Configuration,
+    paths: list[Path],
+    wind_mps: tuple[float, float] | None,
+    choice: Choice,
 ) -> list[_Done]:
     """Return the alerts of all files, or one error about all that cannot be used."""
     done, problems = [], []
     for path in paths:
         try:
-            encounter = read_encounter(path, configuration, wind_mps)
+            encounter = read_encounter(path, configuration, wind_mps, choice)
         except TrafficFileError as error:
             problems.append(str(error).split("\n"))
             continue

@@ -35,6 +35,12 @@ from dsa_des.commands.group import plain_errors
     "heading and airspeed, else none.",
 )
 @click.option(
+    "--ownship", metavar="NAME", help="Name, address or callsign [default: the first aircraft]."
+)
+@click.option(
+    "--own-file", metavar="FILE", help="Another file, with the flight of the ownship at that time."
+)
+@click.option(
     "--decimals",
     default=6,
     show_default=True,
@@ -45,8 +51,8 @@ from dsa_des.commands.group import plain_errors
 def alert(**options: Any) -> None:
     """Alert levels of recorded encounters, by a configuration of DAIDALUS.
 
-    FILE is a .daa or .xyz file, or a .csv table as traffic.csv reads it, whose first aircraft is
-    the ownship; or a folder of .daa and .xyz files.
+    FILE is a file of recorded aircraft of any kind that traffic.file reads: .daa and .xyz, tables,
+    receivers' logs, tracks and more; or a folder of .daa and .xyz files.
     """
     from components.alerting.alert_files import alert_files
 

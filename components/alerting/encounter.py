@@ -11,9 +11,9 @@ from components.alert_configuration.configuration import Configuration, Deviatio
 from components.alerting.levels import AlertPairs
 from components.flights.attitude import fit_path
 from components.flights.sampled_flight import SampledTrajectory
-from components.formats.csv_file import read_csv
-from components.formats.daa_file import EXTRA_COLUMNS, read_daa_samples
-from components.formats.text_rows import Problems, TrafficFileError
+from components.formats.daa_file import DAIDALUS, EXTRA_COLUMNS, read_daa_samples
+from components.formats.recorded.traffic_of_files import Choice, read_traffic
+from components.formats.text_rows import Problems
 from components.geometry import east_north_m, east_north_mps
 from components.guidance.situation import State
 from components.well_clear.detection import Bounds
@@ -62,17 +62,19 @@ def read_encounter(
     path: str | PathLike[str],
     configuration: Configuration,
     wind_mps: tuple[float, float] | None = None,
+    choice: Choice = Choice(),  # noqa: B008
 ) -> Encounter:
-    """Read a `.daa` or `.xyz` file, or a table as `read_csv` does; the first is the ownship.
+    """Read a file of recorded aircraft, of any kind, as is chosen; the first is the ownship.
 
-    Aircraft of a table are sampled at the ownship's times, on the flights that traffic follows.
+    Aircraft of another file than `.daa` and `.xyz` are sampled at the ownship's times, on the
+    flights that traffic follows.
     The wind (towards the east and the north, m/s) is by default what the ownship's columns
     `heading` and `airspeed` imply, where both are given, else none. Targets count at the ownship's
     times: a sample at another instant is left out, as the reference leaves it out. Raises
     `TrafficFileError` with all problems of the file, also without velocities or with an alerter
     that is not there.
     """
-    samples, notes = _samples(path)
+    samples, notes = _samples(path, choice)
     problems = Problems(str(path))
     names = tuple(samples)
     own = samples[names[0]]
@@ -107,31 +109,30 @@ def read_encounter(
     )
 
 
-def _samples(path: str | PathLike[str]) -> tuple[dict[str, Samples], tuple[str, ...]]:
+def _samples(
+    path: str | PathLike[str], choice: Choice
+) -> tuple[dict[str, Samples], tuple[str, ...]]:
     """Return the samples of each aircraft of a file, and what was assumed of them."""
-    if Path(path).suffix.lower() != ".csv":
+    file = read_traffic([Path(path)], choice)
+    if file.kind == DAIDALUS and choice == Choice():
         return read_daa_samples(path, tuple(EXTRA_COLUMNS)), ()
-    try:
-        file = read_csv(path)
-    except TrafficFileError:
-        try:  # one with a row of units is of DAIDALUS, whatever it is called
-            return read_daa_samples(path, tuple(EXTRA_COLUMNS)), ()
-        except TrafficFileError:
-            pass
-        raise
     own = file.ownship
     time_s = own.sample_times_s
+    time_s = time_s[time_s >= 0.0]
     result, far = {own.name: _sampled(own, time_s, file.start_time_s)}, []
     for craft in file.intruders:
-        first_s, last_s = craft.interval_present()
-        there = time_s[(time_s >= first_s) & (time_s <= last_s)]
+        there = time_s[craft.at(time_s).present]
         if len(there):
             result[craft.name] = _sampled(craft, there, file.start_time_s)
         else:
             far.append(craft.name)
     if len(result) < 2:
-        Problems(str(path)).fail(f"no aircraft is there at a time at which {own.name} is")
-    notes = [*file.notes, *file.warnings, "flights are interpolated to the times of the ownship"]
+        Problems(str(path)).fail(
+            f"no aircraft is there at a time at which {own.name} is" if file.intruders else
+            f"there is one aircraft only, {shortened(own.name)!r}: an ownship and at least one "
+            "intruder are needed"
+        )  # fmt: skip
+    notes = [*file.notes, "flights are interpolated to the times of the ownship"]
     if far:
         notes.append(f"never there at a time of the ownship: {shortened(', '.join(far))}")
     return result, tuple(notes)

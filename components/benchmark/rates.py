@@ -15,6 +15,7 @@ import numpy as np
 from components.alert_configuration.conf_file import read_conf
 from components.alerting.levels import due_levels, violation_times_s
 from components.benchmark.scenes import SCENES, chosen, replicas_of, scene_of
+from components.benchmark.shares import shares_by_block
 from components.benchmark.track_updates import LOOKS, by_stone_soup, plainly, updates
 from components.examples import folder
 from components.guidance.bands import guidance_of_many
@@ -176,6 +177,10 @@ class Rate:
     beside: Mapping[str, Callable[[bool], tuple[int, Callable[[], object]] | None]] = field(
         default_factory=dict
     )
+    #: How many at once for ``--quick``; 0 for a tenth.
+    quick: int = 0
+    #: Whether the shares of its blocks are measured too.
+    by_block: bool = False
 
 
 def states(count: int, within_m: float, apart_m: float, seed: int) -> tuple[State, State]:
@@ -275,9 +280,11 @@ RATES = (
     Rate(
         "risk_tracked",
         "the same with radar and camera of stated errors, EKF, DO-365 alerting and a pilot",
-        100,
-        512,
+        200,
+        4000,
         risk_tracked,
+        quick=64,
+        by_block=True,
     ),
 )
 
@@ -285,14 +292,19 @@ RATES = (
 def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     """Return how many are done in a second of CPU, the median of some repetitions."""
     (rate,) = (rate for rate in RATES if rate.name == name)
-    count = rate.count // 10 if quick else rate.count
+    count = (rate.quick or rate.count // 10) if quick else rate.count
     beside = {}
     for name, prepare in rate.beside.items():
         other = prepare(quick)
         if other is not None:
             beside[name] = _per_s(*other, 1 if quick else min(repeats, 2))
-    per_s = _per_s(count, rate.prepare(count), repeats)
-    return {"scene": rate.name, "per_s": per_s, "wanted": rate.wanted, "beside": beside}
+    do = rate.prepare(count)
+    per_s = _per_s(count, do, repeats)
+    shares = shares_by_block(do) if rate.by_block else {}
+    return {
+        "scene": rate.name, "per_s": per_s, "wanted": rate.wanted, "beside": beside,
+        "shares": shares,
+    }  # fmt: skip
 
 
 def _per_s(count: int, do: Callable[[], object], repeats: int) -> float:

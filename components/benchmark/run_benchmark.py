@@ -165,6 +165,12 @@ def _rates(asked: _Asked, rates: list[Rate]) -> list[dict[str, Any]]:
                 f"{row['scene']}: {row['per_s'] / per_s:,.0f} times the {per_s:,.0f}/s of {name} "
                 "on the same detections", soft_wrap=True,
             )  # fmt: skip
+        if shares := row["shares"]:
+            said = ", ".join(f"{name} {share:.0%}" for name, share in shares.items())
+            rest = 1.0 - sum(shares.values())
+            asked.console.print(
+                f"{row['scene']}: {said}, making and measuring runs {rest:.0%}", soft_wrap=True
+            )
     return rows
 
 

@@ -46,6 +46,15 @@ def each_row_group(
                 yield {name: _array(table[name], name in TEXT) for name in columns}
 
 
+def row_count(path: Path) -> int:
+    """Return how many rows a table has; none where it is not there."""
+    if not path.is_file():
+        return 0
+    import pyarrow.parquet as pq
+
+    return int(pq.read_metadata(path).num_rows)
+
+
 def _array(column: Any, text: bool) -> Any:
     if not text:
         return column.combine_chunks().to_numpy(zero_copy_only=False)

@@ -3,6 +3,7 @@
 Tracks are those that were confirmed and have a range.
 """
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from components.display.outcomes import NEAR_M, TABLE, distances
-from components.display.recorded_rows import each_row_group
+from components.display.recorded_rows import each_row_group, row_count
 from components.display.symbols import DENSE, Labels, draw_density
 from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import COVARIANCE, held
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.mark import PALETTE
 from dsa_des.record.drawing import drawing, figure_text, tight
 from dsa_des.running.simulation import Simulation
@@ -25,11 +26,15 @@ from dsa_des.running.simulation import Simulation
 COLOURS = PALETTE[:-1]
 _FALSE, _TRUTH, _OWN = "#999999", "#000000", "#666666"
 _COLUMNS = (
-    "block", "state_s", "track", "track_status", "has_range", "nis", "nis_freedom", *STATE,
+    "tick", "block", "state_s", "track", "track_status", "has_range", "nis", "nis_freedom", *STATE,
     *ORIGIN, *COVARIANCE.values(),
 )  # fmt: skip
 # Rows that are read of a table, at most; of a larger one, groups of rows spread over it.
 _MOST_ROWS = 1_000_000
+# Of each track so many first rows are kept, and of all others so many at most, at random instants:
+# a figure shows no more of a longer run, and takes no more memory.
+_FIRST_ROWS, _KEPT_ROWS = 200, 40_000
+_SPREAD = np.uint64(0x9E3779B97F4A7C15)
 # Chi-square quantiles of 95 % in a plane and on a line.
 _PLANE, _LINE = 5.991464547107979, 3.841458820694124
 _MOST_POINTS, _ELLIPSES = 400, 8
@@ -51,6 +56,26 @@ class DrawnTrack:
     false: bool
     #: That of its tracker where several are compared, else its own, in all figures.
     colour: str
+
+
+class Thinning:
+    """Chooses which rows of many to keep: all of short tracks, and long ones at random instants."""
+
+    def __init__(self, rows: int) -> None:
+        self._each = np.uint64(max(1, math.ceil(rows / _KEPT_ROWS)))
+        self._seen: dict[tuple[str, int], int] = {}
+
+    def __call__(self, tick: IntArray, block: Any, track: IntArray) -> BoolArray:
+        """Return whether each row is kept; rows follow those of the calls before."""
+        kept = (tick.astype(np.uint64) * _SPREAD >> np.uint64(32)) % self._each == 0
+        for name in np.unique(block[~kept].astype(str)).tolist():
+            mine = block == name
+            for number in np.unique(track[mine & ~kept]).tolist():
+                rows = np.flatnonzero(mine & (track == number))
+                known = self._seen.get((name, number), 0)
+                self._seen[name, number] = known + len(rows)
+                kept[rows[: max(_FIRST_ROWS - known, 0)]] = True
+        return np.asarray(kept)
 
 
 class DrawnTracks:
@@ -82,13 +107,17 @@ class DrawnTracks:
     @classmethod
     def read(cls, simulation: Simulation, folder: Path) -> "DrawnTracks | None":
         """Read the tracks of a run's folder; None where none was confirmed."""
-        rows = []
-        for group in each_row_group(folder / f"{TABLE}.parquet", _COLUMNS, _MOST_ROWS):
-            kept = np.flatnonzero(held(group["track_status"]) & group["has_range"])
+        path, rows = folder / f"{TABLE}.parquet", []
+        thinning = Thinning(min(row_count(path), _MOST_ROWS))
+        for group in each_row_group(path, _COLUMNS, _MOST_ROWS):
             group["block"] = np.array(group["block"].names, dtype=object)[group["block"].codes]
-            rows.append({n: group[n][kept] for n in _COLUMNS if n != "track_status"})
-        columns = {n: np.concatenate([part[n] for part in rows]) for n in (rows[0] if rows else ())}
-        return cls(simulation, columns) if rows and len(columns["block"]) else None
+            wanted = np.flatnonzero(held(group["track_status"]) & group["has_range"])
+            kept = wanted[thinning(*(group[n][wanted] for n in ("tick", "block", "track")))]
+            rows.append({n: group[n][kept] for n in _COLUMNS if n not in ("track_status", "tick")})
+        if not any(len(part["block"]) for part in rows):
+            return None
+        names = list(rows[0])
+        return cls(simulation, {n: np.concatenate([part.pop(n) for part in rows]) for n in names})
 
 
 def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:

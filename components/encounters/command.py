@@ -101,9 +101,12 @@ def sample(**options: Any) -> None:
 @click.option(
     "--made", metavar="FILE.toml", help="Encounters made by hand, as a table describes them."
 )
+@click.option(
+    "--tracks", metavar="FOLDER", help="Recorded flights, of which two at a time are paired."
+)
 @click.option("--model", metavar="FILE", help="Encounter model of the ownship.")
 @click.option("--intruder-model", metavar="FILE", help="That of the intruder [default: the same].")
-@click.option("--count", type=click.IntRange(1, 100_000_000), help="Encounters of models.")
+@click.option("--count", type=click.IntRange(1, 100_000_000), help="How many, of models or tracks.")
 @click.option(
     "--first",
     type=click.IntRange(0, 2**53),
@@ -137,7 +140,7 @@ def sample(**options: Any) -> None:
 @click.option("--out", required=True, metavar="SET.parquet", help="The set.")
 @plain_errors
 def generate(**options: Any) -> None:
-    """Make a set of weighted encounters from encounter models, or of some made by hand."""
+    """Make a set of weighted encounters from encounter models, from real tracks, or by hand."""
     from components.encounters.model_commands import generate_set
 
     generate_set(**options)
@@ -157,8 +160,9 @@ def generate(**options: Any) -> None:
 def convert(**options: Any) -> None:
     """Turn encounters of public formats into a set, or a set into waypoints.
 
-    FILE is a set (.parquet), a file of waypoints (.bin, .dat), or tracks (.txt, .csv, .mat), one
-    encounter each; files of one aircraft are taken two by two, the ownship's first.
+    FILE is a set (.parquet), a file of waypoints (.bin, .dat), or tracks (.txt, .csv, .mat, or any
+    file of recorded aircraft), one encounter each; files of one aircraft are taken two by two, the
+    ownship's first.
     """
     from components.encounters.set_commands import convert_sets
 

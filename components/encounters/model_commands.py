@@ -8,23 +8,35 @@ from pathlib import Path
 
 import numpy as np
 
+from components.arguments.units import FOOT_M
 from components.encounters.made_encounters import made_set, read_recipe
 from components.encounters.model import EncounterModel
 from components.encounters.model_file import ModelFileError, read_model
 from components.encounters.pair_densities import (
+    REFERENCE_FT,
     PairingRules,
     pairing_rules,
+    speeds_over_directions,
 )
-from components.encounters.pairing import PairSampler, set_of_pairs
+from components.encounters.pairing import (
+    COURSES,
+    PairSampler,
+    are_kept,
+    drawn_course,
+    set_of_pairs,
+)
 from components.encounters.sampling import EncounterDraws, SampledTracks, TrackSampler
 from components.encounters.track_rules import TrackError, TrackRules, accepted_tracks
-from components.formats.encounter_set import EncounterSet
-from components.formats.public_formats import SET
+from components.formats.encounter_set import NAMES, EncounterSet
+from components.formats.public_formats import SET, set_of_tracks
+from components.formats.recorded.known_kinds import record
+from components.formats.recorded.paired_tracks import TrackWindows, apart, is_flying, turned
 from components.formats.set_file import is_origin, write_set
-from dsa_des.arrays.types import AnyArray
+from components.formats.text_rows import TrafficFileError
+from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.errors.budgets import foreseen
-from dsa_des.files.input_files import InputFileError, resolve_home
+from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
 from dsa_des.files.output_file import check_ending, check_file, streamed
 from dsa_des.files.output_names import named, reason_of
 from dsa_des.terminal.terminal import say
@@ -156,6 +168,7 @@ _PAIR = (1e-3, 900.0)
 
 def generate_set(
     made: str | None,
+    tracks: str | None,
     model: str | None,
     intruder_model: str | None,
     count: int | None,
@@ -169,14 +182,24 @@ def generate_set(
     """Write a set of paired encounters, or of those that a table describes."""
     check_origin(at)
     if made is not None:
-        if model is not None or intruder_model is not None or count is not None:
-            raise UsageError("--made says all of its encounters: no --model and no --count with it")
+        if any(one is not None for one in (tracks, model, intruder_model, count)):
+            raise UsageError(
+                "--made says all of its encounters: no --model, --tracks and --count with it"
+            )
         if horizontal is not None or vertical is not None:
             raise UsageError("--horizontal and --vertical belong to --model, not to --made")
         _write_made(made, out)
         return
+    if tracks is not None and (model is not None or intruder_model is not None):
+        raise UsageError("--tracks are flown by both aircraft: no --model with them")
+    if tracks is not None and count is not None:
+        _write_pairs(tracks, range(first, first + count), seed, at, horizontal, vertical, out)
+        return
     if model is None or count is None:
-        raise UsageError("either --model FILE and --count N are needed, or --made FILE.toml")
+        raise UsageError(
+            "either --model FILE and --count N are needed, or --tracks FOLDER and --count N, or "
+            "--made FILE.toml"
+        )
     own = open_model(model)
     intruder = own if intruder_model is None else open_model(intruder_model)
     path = named(out)
@@ -206,6 +229,98 @@ def generate_set(
             say(f"note: {file}: {note}")
     say(f"{path}: {count} encounters of {rules.duration_s} s")
     say(f"effective sample size {total * total / squares:.1f}; {attempts} proposals")
+
+
+#: Proposals of one pair of tracks that may be rejected.
+_MOST_TRIES = 10_000
+_OF_TRACKS = "pairs of tracks"
+
+
+def _write_pairs(
+    folder: str,
+    numbers: range,
+    seed: int,
+    at: tuple[float, float],
+    horizontal: tuple[str, str] | None,
+    vertical: tuple[str, str] | None,
+    out: str,
+) -> None:
+    """Write a set of pairs of recorded flights."""
+    path = named(out)
+    check_ending(path, [SET])
+    check_file(path)
+    rules = _rules(horizontal, vertical)
+    try:
+        place = resolve_home(folder)
+        if not is_folder(place):
+            raise UsageError(f"--tracks {folder}: must be a folder of recorded flights")
+        files = sorted(p for p in place.iterdir() if p.is_file() and p.name[0] != ".")
+        flights = [one for file in files for one in record(file).samples.values()]
+    except InputFileError as error:
+        raise UsageError(f"--tracks {folder}: {error}") from None
+    except TrafficFileError as error:
+        raise UsageError(*str(error).split("\n")) from None
+    windows = TrackWindows(flights, rules.duration_s, rules.closest_s)
+    if windows.flights < 2:
+        raise UsageError(
+            f"--tracks {folder}: {len(flights)} flights, of which {windows.flights} are known for "
+            f"{rules.duration_s} s without a gap: two at least must be"
+        )
+    draws = EncounterDraws(seed, _OF_TRACKS)
+    made = [_pair(windows, draws, rules, number) for number in numbers]
+    times_s = np.arange(rules.duration_s + 1.0)
+    pairs = [
+        [(name, (times_s, *one)) for name, one in zip(NAMES, both, strict=True)]
+        for _, both, _ in made
+    ]
+    weights = [weight for weight, _, _ in made]
+    encounters = set_of_tracks(str(path), list(numbers), weights, pairs, at)
+    about = {"made_by": "pairs of recorded flights", "flights": len(flights), "seed": seed}
+    write_set(path, about, [encounters])
+    total, squares = math.fsum(weights), math.fsum(weight**2 for weight in weights)
+    say(f"{path}: {len(numbers)} encounters of {rules.duration_s} s")
+    say(f"of {windows.flights} of {len(flights)} flights, {windows.count:,} windows")
+    say(
+        f"effective sample size {total * total / squares:.1f}; "
+        f"{sum(tries for _, _, tries in made)} proposals"
+    )
+
+
+def _pair(
+    windows: TrackWindows, draws: EncounterDraws, rules: PairingRules, number: int
+) -> tuple[float, tuple[FloatArray, FloatArray], int]:
+    """Return the weight and the paths (m) of one pair, and how many proposals it took."""
+    who = np.array([number])
+    for attempt in range(_MOST_TRIES):
+        drawn = draws.uniform(who, 4 + 2 * COURSES, attempt)
+        (first, own), (second, other) = (windows.drawn(float(share[0])) for share in drawn[:2])
+        speeds = [windows.velocity(path) for path in (own, other)]
+        if first == second or not all(map(is_flying, speeds)):
+            continue
+        level = [np.array([np.hypot(v[0], v[1])]) / FOOT_M for v in speeds]
+        climb = np.array([speeds[1][2] - speeds[0][2]]) / FOOT_M
+        course = drawn_course(level[0], level[1], climb, drawn[4:])
+        density, accept = rules.horizontal_ft, rules.vertical_ft
+        miss_ft = density.where_area_is(drawn[2] * density.area)
+        up_ft = accept.where_area_is(drawn[3] * accept.area)
+        north, east = level[1] * np.cos(course) - level[0], level[1] * np.sin(course)
+        relative = np.maximum(np.hypot(north, east), 1e-9)
+        place_m = miss_ft * FOOT_M * np.array([east, -north]) / relative
+        own = turned(own, speeds[0], 0.0)
+        other = turned(other, speeds[1], float(course[0]))
+        other = apart(
+            own, other, rules.closest_s, (float(place_m[0, 0]), float(place_m[1, 0])),
+            float(up_ft[0]) * FOOT_M,
+        )  # fmt: skip
+        paths_ft = np.stack([own, other], axis=1)[..., np.newaxis] / FOOT_M
+        if are_kept(rules, list(paths_ft), miss_ft, up_ft)[0]:
+            q = density.at(miss_ft) / density.area
+            chance = accept.at(up_ft) / accept.heights.max()
+            weight = speeds_over_directions(level[0], level[1], climb) / (2.0 * REFERENCE_FT)
+            return float((weight / q / chance)[0]), (own, other), attempt + 1
+    raise UsageError(
+        f"pair {number} was rejected {_MOST_TRIES} times: the flights do not meet as the rules ask"
+    )
 
 
 def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None) -> PairingRules:

@@ -18,7 +18,7 @@ Courses are accepted by the speeds at the closest approach, as S has them (upstr
 time 0 for one and those at the closest approach for the other).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,7 +35,7 @@ from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 #: Pairs that are made together, and attempts of them that are looked at together.
 PAIRS_AT_ONCE = 6144
 _FLIGHTS_AT_ONCE, _MOST_EACH, _MOST_AT_ONCE = 2048, 6, 256
-_COURSES, _COURSES_FROM = 40, 4
+COURSES, _COURSES_FROM = 40, 4
 _MOST_ATTEMPTS = 1_000_000
 
 
@@ -197,7 +197,7 @@ class PairSampler:
         for k, c in enumerate(commands):
             c.altitude_ft[:] = altitude[k, done]
         rows = rows[done]
-        more = self._draws.few(numbers[rows], _COURSES_FROM + 2 * _COURSES, attempts[rows])
+        more = self._draws.few(numbers[rows], _COURSES_FROM + 2 * COURSES, attempts[rows])
         pairs = self._paired(numbers[rows], attempts[rows], commands, vertical[done], more[3:])
         kept = self._kept(pairs).nonzero()[0]
         return rows[kept], kept, pairs
@@ -227,7 +227,7 @@ class PairSampler:
         ]
         first, second = (f.speed_ft_s[cpa] for f in flown)
         climb = flown[1].climb_ft_s[cpa] - flown[0].climb_ft_s[cpa]
-        course = _course(first, second, climb, drawn[1:])
+        course = drawn_course(first, second, climb, drawn[1:])
         density = self.rules.horizontal_ft
         horizontal = density.where_area_is(drawn[0] * density.area)
         north = second * np.cos(course) - first
@@ -258,24 +258,36 @@ class PairSampler:
         )  # fmt: skip
 
     def _kept(self, pairs: Pairs) -> BoolArray:
-        """Return which pairs begin far enough from each other, and are closest when they should."""
-        rules = self.rules
-        north, east, up = (
-            values[1] - values[0] for values in (pairs.north_ft, pairs.east_ft, pairs.up_ft)
-        )
-        squared = north * north + east * east
-        near = (np.abs(up[0]) < rules.start_vertical_ft) & (squared[0] < rules.start_range_ft**2)
-        at = np.argmin(squared, axis=0)
-        here = np.arange(squared.shape[1])
-        miss = np.abs(np.sqrt(squared[at, here]) - np.abs(pairs.horizontal_ft))
-        wrong = np.abs(up[at, here] - pairs.vertical_ft)
-        good: BoolArray = (
-            ~near
-            & (at >= rules.closest_s)
-            & (miss < rules.largest_horizontal_error_ft)
-            & (wrong < rules.largest_vertical_error_ft)
-        )
-        return good
+        return are_kept(
+            self.rules, (pairs.north_ft, pairs.east_ft, pairs.up_ft), pairs.horizontal_ft,
+            pairs.vertical_ft,
+        )  # fmt: skip
+
+
+def are_kept(
+    rules: PairingRules,
+    paths_ft: Sequence[FloatArray],
+    horizontal_ft: FloatArray,
+    vertical_ft: FloatArray,
+) -> BoolArray:
+    """Return which pairs begin far enough from each other, and are closest when they should.
+
+    Paths are north, east and up, each (2, seconds + 1, pairs).
+    """
+    north, east, up = (values[1] - values[0] for values in paths_ft)
+    squared = north * north + east * east
+    near = (np.abs(up[0]) < rules.start_vertical_ft) & (squared[0] < rules.start_range_ft**2)
+    at = np.argmin(squared, axis=0)
+    here = np.arange(squared.shape[1])
+    miss = np.abs(np.sqrt(squared[at, here]) - np.abs(horizontal_ft))
+    wrong = np.abs(up[at, here] - vertical_ft)
+    good: BoolArray = (
+        ~near
+        & (at >= rules.closest_s)
+        & (miss < rules.largest_horizontal_error_ft)
+        & (wrong < rules.largest_vertical_error_ft)
+    )
+    return good
 
 
 @dataclass(frozen=True)
@@ -297,7 +309,7 @@ def _together(parts: list[Pairs]) -> Pairs:
     return Pairs(**{n: np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names})
 
 
-def _course(
+def drawn_course(
     first: FloatArray, second: FloatArray, climb: FloatArray, drawn: FloatArray
 ) -> FloatArray:
     """Return courses with a density that goes with the relative speed, by rejection.
@@ -307,7 +319,7 @@ def _course(
     most = (first + second) ** 2 + climb**2
     result = np.zeros_like(first)
     left: BoolArray = np.ones(len(first), dtype=np.bool_)
-    for k in range(_COURSES):
+    for k in range(COURSES):
         course = 2.0 * np.pi * drawn[2 * k]
         squared = first**2 + second**2 - 2.0 * first * second * np.cos(course) + climb**2
         take = left & (drawn[2 * k + 1] ** 2 * most <= squared)

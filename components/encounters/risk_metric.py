@@ -178,6 +178,25 @@ class RiskRatios(Mitigated):
             result |= {_COMMANDED: commanded, _NEEDLESS: result[_KEPT] * commanded}
         return result
 
+    def unit_weights(self, group: Group) -> FloatArray:
+        """Return the weights of the encounters."""
+        if self._weight is None:
+            return super().unit_weights(group)
+        weights: FloatArray = self._weight.measure(group)["encounter_weight"]
+        return weights
+
+    def nominal(self, group: Group) -> dict[str, AnyArray]:
+        """Return both events without manoeuvres; flights tell where the plane is not sure."""
+        meeting = met_in_plane(group, self.p)
+        if meeting is None:
+            return super().nominal(group)
+        result = _events_of(meeting)
+        unsure = np.flatnonzero(meeting.unsure.any(axis=0))
+        if len(unsure):
+            for name, column in self.losses(group, steered=False, some=unsure).items():
+                result[f"{name}_nominal"][unsure] = column
+        return result
+
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
         """Return what no manoeuvre changes, and the geometry of the closest approach."""
         meeting, sizes_m = met_in_plane(group, self.p), self.p.sizes_m
@@ -215,15 +234,11 @@ class RiskRatios(Mitigated):
 
     def _of_nominal(self, group: Group) -> dict[str, AnyArray]:
         """Return events and classes of flights without manoeuvres."""
-        return {**self.losses(group, steered=False), **self._classes(group)}
+        return {**super().nominal(group), **self._classes(group)}
 
     def _of_meeting(self, meeting: Meetings) -> dict[str, AnyArray]:
         """Return the same of paths in the plane, as far as these are sure."""
-        result: dict[str, AnyArray] = {
-            f"{name}_nominal": inside.astype(float)
-            for name, inside in zip(("well_clear_lost", "nmac"), meeting.inside, strict=True)
-        }
-        return result | self._named(*meeting.closest[4:])
+        return _events_of(meeting) | self._named(*meeting.closest[4:])
 
     def _between_classes(self, meeting: Meetings) -> BoolArray:
         """Return of which runs the plane does not tell the classes."""
@@ -260,6 +275,13 @@ class RiskRatios(Mitigated):
         if self._weight is not None:
             result |= self._weight.measure(group)
         return result | self._classes(group)
+
+
+def _events_of(meeting: Meetings) -> dict[str, AnyArray]:
+    return {
+        f"{name}_nominal": inside.astype(float)
+        for name, inside in zip(("well_clear_lost", "nmac"), meeting.inside, strict=True)
+    }
 
 
 def may_climb(block: Block) -> bool:

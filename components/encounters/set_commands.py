@@ -13,6 +13,7 @@ from components.encounters.model_commands import check_origin
 from components.encounters.splitting import expected_copies, nearness, split_set
 from components.formats.encounter_set import EncounterSet, geometry_class
 from components.formats.public_formats import SET, WAYPOINTS, read_encounters, waypoints_of
+from components.formats.recorded.encounter_tracks import recorded_tracks
 from components.formats.set_file import EncounterSetError, read_set, write_set
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.errors import OutputError, UsageError
@@ -39,7 +40,9 @@ def convert_sets(
         raise UsageError(f"--out {out}: must end in {SET}, or in {' or '.join(WAYPOINTS)}")
     check_file(path)
     try:
-        encounters = read_encounters([resolve_home(text) for text in files], at, skip_damaged)
+        encounters = read_encounters(
+            [resolve_home(text) for text in files], at, skip_damaged, recorded_tracks
+        )
         if weights is not None:
             options = "--weights", "--weights"
             new = _by_encounter(encounters, weights, "weight", *options, least=False)
@@ -57,8 +60,17 @@ def convert_sets(
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
     say(f"{path}: {len(encounters)} encounters")
+    _say_more(encounters)
+
+
+def _say_more(encounters: EncounterSet) -> None:
+    """Say what was left out of a set, and what was done to the rows of its files."""
     if encounters.skipped:
         say(f"{encounters.skipped} damaged encounters were skipped")
+    for note in encounters.notes[:_MOST_NOTES]:
+        say(f"note: {note}", err=True)
+    if len(encounters.notes) > _MOST_NOTES:
+        say(f"note: and {len(encounters.notes) - _MOST_NOTES} more", err=True)
 
 
 def _by_encounter(
@@ -81,7 +93,7 @@ def _by_encounter(
     return np.array([known[n] for n in encounters.numbers.tolist()])
 
 
-_DRAWN = 12
+_DRAWN, _MOST_NOTES = 12, 20
 
 
 @dataclass(frozen=True)
@@ -137,7 +149,9 @@ def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged
         check_ending(path, PICTURES, "--figure")
         check_file(path, "--figure")
     try:
-        encounters = read_encounters([resolve_home(text) for text in files], None, skip_damaged)
+        encounters = read_encounters(
+            [resolve_home(text) for text in files], None, skip_damaged, recorded_tracks
+        )
     except (EncounterSetError, InputFileError) as error:
         raise UsageError(*str(error).split("\n")) from None
     indices = np.unique(
@@ -151,8 +165,7 @@ def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged
     )
     say(f"sum of weights {total:.6g}, effective sample size {total**2 / squares:.1f}" if squares
         else "all weights are 0")  # fmt: skip
-    if encounters.skipped:
-        say(f"{encounters.skipped} damaged encounters were skipped")
+    _say_more(encounters)
     if len(indices) < len(encounters):
         say(f"closest approaches of {len(indices)} of them, evenly spread")
     headings = ["at the closest approach", "5 %", "median", "95 %", "weighted mean"]

@@ -107,11 +107,13 @@ class Navigation(Parameters):
     """Errors of the ownship's navigation (TECVOL, thesis §2.3.1), believed minus true."""
 
     position_bias_m: tuple[PositionError, PositionError, PositionError] = Field(
-        default=(0.0, 0.0, 0.0), description="Constant error north, east and down, m."
+        default=(0.0, 0.0, 0.0),
+        description="Constant error north, east and down, m; these turn near a pole.",
     )
     position_noise_m: tuple[PositionNoise, PositionNoise, PositionNoise] = Field(
         default=(0.0, 0.0, 0.0),
-        description="Standard deviation of the noise north, east and down, m.",
+        description="Standard deviation of the noise north, east and down, m; where it lasts it is "
+        "fixed to the Earth, and does not turn near a pole.",
     )
     position_correlation_time_s: float = Field(
         default=60.0,
@@ -202,10 +204,16 @@ class Terrain(Parameters):
     )
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to ground that there is not."""
+        """Say which keys belong to ground that there is not, and where ground is made up."""
         said = []
         if self.raster is None:
             said += self.idle("raster_offset_m", because="raster is not given")
+        elif filled := self.raster.raster.filled:
+            share = filled / self.raster.raster.height_m.size
+            said.append(
+                f"raster: {filled:,} nodes without a height ({share:.2%}) in "
+                f"{self.raster.raster.name} are filled from around them"
+            )
         if self.height_m is None:
             clutter = "clutter_gamma_db", "clutter_motion_m_s", "clutter_mean"
             said += self.idle(*clutter, because="height_m is not given")

@@ -19,7 +19,12 @@ from components.flights.fleet import (
     empty_state,
     in_blocks,
 )
-from components.flights.sampled_segments import evaluate_segments, fit_segments, locate
+from components.flights.sampled_segments import (
+    STRAIGHT_ROWS,
+    evaluate_segments,
+    fit_segments,
+    locate,
+)
 from components.geometry import (
     TrajectoryState,
     Vector,
@@ -287,19 +292,30 @@ class SampledFleet(Fleet):
 
     def __init__(self, trajectories: Sequence[SampledTrajectory]) -> None:
         self._flights = list(trajectories)
+
+    @cached_property
+    def _bases(self) -> list[tuple[FloatArray, list[int]]]:
+        """Sample times, and which flights have them."""
         by_bytes: dict[bytes, list[int]] = {}
         for i, flight in enumerate(self._flights):
             by_bytes.setdefault(flight.sample_times_s.tobytes(), []).append(i)
-        self._bases = [(self._flights[of[0]].sample_times_s, of) for of in by_bytes.values()]
-        tables = [np.zeros((25, 0)), *(flight.coefficients for flight in self._flights)]
-        self._table = np.ascontiguousarray(np.concatenate(tables, axis=1))
+        return [(self._flights[of[0]].sample_times_s, of) for of in by_bytes.values()]
+
+    @cached_property
+    def _table(self) -> FloatArray:
+        """What is known of each segment, one after the other: in a row of the memory."""
+        return _side_by_side([flight.coefficients for flight in self._flights])
+
+    @cached_property
+    def _away(self) -> BoolArray | None:
+        """In which segments, one after the other, an aircraft is away; None where none ever is."""
         gaps = [flight.away for flight in self._flights]
-        self._away: BoolArray | None = None
-        if any(one is not None for one in gaps):
-            none = (np.zeros(len(flight.sample_times_s), dtype=bool) for flight in self._flights)
-            self._away = np.concatenate(
-                [empty if one is None else one for one, empty in zip(gaps, none, strict=True)]
-            )
+        if all(one is None for one in gaps):
+            return None
+        none = (np.zeros(len(flight.sample_times_s), dtype=bool) for flight in self._flights)
+        return np.concatenate(
+            [empty if one is None else one for one, empty in zip(gaps, none, strict=True)]
+        )
 
     def __len__(self) -> int:
         return len(self._flights)
@@ -330,7 +346,7 @@ class SampledFleet(Fleet):
             if self._away is not None:
                 present &= ~self._away[index] | (elapsed == 0.0)
             values = evaluate_segments(
-                self._table[:, index.reshape(-1)], elapsed.reshape(-1), present.reshape(-1)
+                self._segments(index.reshape(-1)), elapsed.reshape(-1), present.reshape(-1)
             ).reshaped(shape)
             for out, value in zip(state.arrays(), values.arrays(), strict=True):
                 out[block] = value
@@ -339,6 +355,9 @@ class SampledFleet(Fleet):
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
         return in_blocks(self._state, aircraft, time_s)
+
+    def _segments(self, index: IntArray) -> FloatArray:
+        return np.ascontiguousarray(self._table.take(index, axis=0).T)
 
     def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         samples, first, last = self._find.starts_s, self._find.first, self._find.last
@@ -350,7 +369,18 @@ class SampledFleet(Fleet):
         elapsed = inside - samples[segment]
         if self._away is not None:
             present &= ~self._away[segment] | (elapsed == 0.0)
-        return evaluate_segments(self._table.take(segment, axis=1), elapsed, present)
+        return evaluate_segments(self._segments(segment), elapsed, present)
+
+
+def _side_by_side(tables: Sequence[FloatArray]) -> FloatArray:
+    """Return coefficients (rows, n) of several flights as one table (segments, rows)."""
+    rows = max(map(len, tables), default=STRAIGHT_ROWS)
+    result = np.zeros((sum(table.shape[1] for table in tables), rows))
+    end = 0
+    for table in tables:
+        start, end = end, end + table.shape[1]
+        result[start:end, : len(table)] = table.T
+    return result
 
 
 def _mean_speed_bound(

@@ -28,10 +28,12 @@ within 0.5 m/s + 1 m/s²·dt of the segment's mean velocity (at constant acceler
 equal) and the two differ by less than 20 m/s²·dt + 1 m/s. Real files hold worse, and a wrong
 velocity would bend a path that a straight line leaves good."""
 
-# Rows of the coefficient table: four cubics (normal x, y, z and altitude) and the attitude.
-_ALT, _LAT, _LON, _YAW, _YAW_RATE, _TURN_WITH_LON = 12, 16, 17, 18, 19, 20
-_PITCH, _PITCH_RATE, _ROLL, _ROLL_RATE = 21, 22, 23, 24
-_ROWS = 25
+# Rows of the coefficient table: position and attitude at the sample, how they change, and, where
+# any segment is bent, terms of second and third order of the normal's x, y and z and of altitude.
+_LAT, _LON, _YAW, _YAW_RATE, _TURN_WITH_LON = 0, 1, 2, 3, 4
+_PITCH, _PITCH_RATE, _ROLL, _ROLL_RATE = 5, 6, 7, 8
+_START, _SLOPE, _SECOND, _THIRD = 9, 13, 17, 21
+STRAIGHT_ROWS, BENT_ROWS = 17, 25
 
 
 def fit_segments(
@@ -40,13 +42,15 @@ def fit_segments(
     attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
     velocity_enu_mps: Vector | None = None,
 ) -> FloatArray:
-    """Tabulate each segment's polynomials, (25, n), or (25, n, aircraft) at the same times.
+    """Tabulate each segment's polynomials, (rows, n), or (rows, n, aircraft) at the same times.
 
     The last sample is a segment of its own; positions are latitude, longitude (deg), altitude (m).
+    Without velocities all are straight, and there are `STRAIGHT_ROWS`, else `BENT_ROWS`.
     """
     lat_deg, lon_deg, alt_m = position
     yaw_rad, pitch_rad, roll_rad = attitude_rad
-    table = np.zeros((_ROWS, *lat_deg.shape))
+    rows = STRAIGHT_ROWS if velocity_enu_mps is None else BENT_ROWS
+    table = np.zeros((rows, *lat_deg.shape))
     _, _, normal = local_axes(lat_deg, lon_deg)
     start = (*normal, alt_m)
     table[_LAT], table[_LON] = lat_deg, lon_deg
@@ -57,16 +61,16 @@ def fit_segments(
         tangents = _tangents(lat_deg, lon_deg, alt_m, velocity_enu_mps)
     bent = None if tangents is None else _bent_segments(start, tangents, duration)
     for row, value in enumerate(start):
-        table[4 * row] = value
+        table[_START + row] = value
         slope = np.diff(value, axis=0) / duration
-        table[4 * row + 1, :-1] = slope
+        table[_SLOPE + row, :-1] = slope + 0.0  # a zero of either sign is a plain one
         if tangents is not None and bent is not None:
             m0, m1 = tangents[row][:-1], tangents[row][1:]
-            table[4 * row + 1, :-1] = np.where(bent, m0, slope)
+            table[_SLOPE + row, :-1] = np.where(bent, m0, slope)
             second = (3.0 * slope - 2.0 * m0 - m1) / duration
             third = (m0 + m1 - 2.0 * slope) / (duration * duration)
-            table[4 * row + 2, :-1] = np.where(bent, second, 0.0)
-            table[4 * row + 3, :-1] = np.where(bent, third, 0.0)
+            table[_SECOND + row, :-1] = np.where(bent, second, 0.0)
+            table[_THIRD + row, :-1] = np.where(bent, third, 0.0)
     # Near a pole yaw turns with longitude, by a whole turn for a whole turn, so that it is
     # yaw minus longitude (plus, in the south) that changes slowly and can be interpolated.
     turn = np.where(np.abs(lat_deg) > 60.0, np.sign(lat_deg), 0.0)
@@ -124,14 +128,20 @@ def evaluate_segments(
     table: FloatArray, elapsed: FloatArray, present: npt.NDArray[np.bool_]
 ) -> TrajectoryState:
     """Evaluate gathered segments, element by element."""
-    x, y, z, alt = (
-        ((table[r + 3] * elapsed + table[r + 2]) * elapsed + table[r + 1]) * elapsed + table[r]
-        for r in (0, 4, 8, _ALT)
-    )
-    lat, lon = normal_to_degrees(x, y, z)
-    at_sample = elapsed == 0.0
-    lat = np.where(at_sample, table[_LAT], lat)
-    lon = np.where(at_sample, table[_LON], lon)
+
+    def at(part: int) -> FloatArray:
+        slope = table[_SLOPE + part]
+        if len(table) > STRAIGHT_ROWS:
+            slope = (table[_THIRD + part] * elapsed + table[_SECOND + part]) * elapsed + slope
+        return np.asarray(slope * elapsed + table[_START + part])
+
+    lat, lon, alt = table[_LAT], table[_LON], at(3)
+    between = elapsed != 0.0
+    if between.any():
+        lat, lon = (
+            np.where(between, moved, sample)
+            for moved, sample in zip(normal_to_degrees(*map(at, range(3))), (lat, lon), strict=True)
+        )
     yaw = table[_YAW] + table[_YAW_RATE] * elapsed
     yaw += table[_TURN_WITH_LON] * wrap_longitude_deg(lon - table[_LON])
     pitch = table[_PITCH] + table[_PITCH_RATE] * elapsed

@@ -88,7 +88,7 @@ def read_asterix(
         data = read_input_bytes(Path(path))
     except InputFileError as error:
         problems.fail(str(error))
-    return record_asterix(problems, data, altitude, ownship).flights()
+    return record_asterix(problems, data, altitude, ownship, least=2).flights()
 
 
 def record_asterix(
@@ -97,6 +97,7 @@ def record_asterix(
     altitude: Altitude | None = None,
     ownship: str | None = None,
     of_day_s: float | None = None,
+    least: int = 1,
 ) -> Recording:
     """Return the aircraft of data blocks, see `read_asterix`.
 
@@ -119,6 +120,7 @@ def record_asterix(
     table = SampleTable(
         problems, ("name", *headers), 0, cells, optional=_MOVES, gaps=True,
         instead={} if altitude else {"alt": "alt instead"}, rows="records",
+        least=least,
     )  # fmt: skip
     table.notes.warnings += warnings
     rows: dict[tuple[object, ...], dict[float, int]] = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from itertools import chain
 from os import PathLike
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.formats.receiver_logs import log_of
+from components.formats.receiver_logs import UNKNOWN_JSON, log_of
 from components.formats.recording import Recording
 from components.formats.reports import recording_of
 from components.formats.sample_columns import (
@@ -23,6 +23,7 @@ from components.formats.sample_columns import (
     complete_velocity,
     enu_velocity,
     indices_of,
+    is_missing,
     unit_factor,
 )
 from components.formats.sample_table import SampleTable
@@ -52,11 +53,14 @@ _CLIMBS = (
     "vs", "vertrate", "verticalrate", "verticalspeed", "climb", "climbrate", "geomrate", "barorate",
 )  # fmt: skip
 # An address is one aircraft's, which a callsign need not be.
+_ADDRESSES = ("icao24", "icao", "hex", "hexident", "icaoaddress", "address")
 _IDENTITIES = (
-    "icao24", "icao", "hex", "hexident", "icaoaddress", "address", "id", "name", "callsign",
-    "aircraft", "acid", "flight", "ident",
+    *_ADDRESSES, "id", "name", "callsign", "aircraft", "acid", "flight", "ident",
 )  # fmt: skip
-_TIMES = ("time", "timestamp", "t", "posixtime", "unixtime", "utc", "datetime", "timeposition")
+#: When positions were received: state vectors repeat one until the next comes.
+_OF_POSITIONS = ("timeposition", "lastposupdate", "lastposition")
+_CLOCKS = ("time", "timestamp", "t", "posixtime", "unixtime", "utc", "datetime")
+_TIMES = (*_OF_POSITIONS, *_CLOCKS)
 _DATES = ("date", "utcdate")
 #: Latitude and longitude in one cell.
 _POSITIONS = ("position", "latlon", "latlng")
@@ -80,6 +84,8 @@ _FAMILIES = (
     ("readsb", ({"altgeom"}, {"altbaro"}, {"geomrate"}, {"barorate"})),
     ("FlightRadar24", ({"timestamp", "utc", "callsign", "speed", "direction"},)),
     ("BaseStation", ({"hexident"},)),
+    # Of OpenSky's data, in Python.
+    ("the library traffic", ({"icao24", "altitude", "groundspeed", "verticalrate"},)),
 )
 #: Fewer different ones may be in steps of 25 by chance.
 _FEW_HEIGHTS = 5
@@ -100,15 +106,18 @@ def read_csv(
     tables with columns that only readsb, FlightRadar24 or BaseStation write, which are in feet,
     knots and feet per minute. Time is a number or ISO 8601 (UTC unless it says otherwise). Latitude
     and longitude may stand in one cell. Rows without a time or a position are left out; heading,
-    pitch, roll and velocity are used for aircraft where they have no gaps. With `altitude` the
-    column of that kind is read, else the one whose name comes first. The ownship is the first
-    aircraft unless its id is given; all that is wrong is one `TrafficFileError`.
+    pitch, roll and velocity are used for aircraft where they have no gaps. One name of several
+    aircraft that no one could be is told apart (`components.formats.recording.told_apart`). With
+    `altitude` the column of that kind is read, else the one whose name comes first. The ownship is
+    the first aircraft unless its id is given; all that is wrong is one `TrafficFileError`.
     """
     problems = Problems(str(path))
     data = read_content(Path(path), problems)
     log = log_of(problems, data)
     if log is not None:
         return recording_of(problems, log, ownship, altitude).flights()
+    if data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
+        problems.fail(UNKNOWN_JSON)
     text = text_of(data, problems)
     del data  # of many rows it is not held beside their samples
     return record_table(problems, text, ownship, altitude).flights()
@@ -119,15 +128,17 @@ def record_table(
     text: str,
     ownship: str | None = None,
     altitude: Altitude | None = None,
-    least: int = 2,
+    stem: str | None = None,
 ) -> Recording:
-    """Return the aircraft of a table, `least` or more, see `read_csv`."""
+    """Return the aircraft of a table, see `read_csv`: two or more, or any, called as its `stem`
+    where there is no column of names.
+    """
     (header_line, header_text), body = _header_and_rows(problems, each_line(text))
     header_text = header_text.lstrip("#").strip(" ")
     delimiter = next((d for d in (",", ";", "\t", "|") if d in header_text), " ")
     ((_, headers),) = _rows(iter([(header_line, header_text)]), delimiter)
     rows = _rows((one for one in body if not one[1].startswith("#")), delimiter)
-    return record_rows(problems, headers, header_line, rows, ownship, altitude, least)
+    return record_rows(problems, headers, header_line, rows, ownship, altitude, stem)
 
 
 def record_rows(
@@ -137,34 +148,46 @@ def record_rows(
     rows: Iterator[tuple[int, list[str]]],
     ownship: str | None = None,
     altitude: Altitude | None = None,
-    least: int = 2,
+    stem: str | None = None,
     kind: str = "a table",
 ) -> Recording:
-    """Return the aircraft of rows of cells, each with its line."""
+    """Return the aircraft of rows of cells, each with its line, see `record_table`."""
     at, position = len(headers), _single_position(headers)
+    is_nameless = stem is not None and _KNOWN_NAMES.isdisjoint(
+        _name_and_unit(header)[0] for header in headers
+    )
+    if is_nameless:
+        headers.append("id")
     if position is not None:
         headers[position : position + 1] = ["lat", "lon"]
     columns, notes = _find_columns(problems, headers, header_line, altitude)
     identity, time = columns.pop("id").index, columns["time"].index
     plain = [_name_and_unit(header)[0] for header in headers]
     date = next((plain.index(name) for name in _DATES if name in plain), None)
-    first = next(rows, None)
-    if first is not None and len(first[1]) > time:
-        columns["time"] = _epoch(columns["time"], first[1][time], headers[time], notes)
+    # Where a position's own time is not known, that of its row must do.
+    other = next((plain.index(name) for name in _CLOCKS if name in plain), time)
+    ahead = _until_a_time(rows, time, other)
+    if ahead and (begins := _time_cell(ahead[-1][1], time, other)):
+        columns["time"] = _epoch(columns["time"], begins, headers[time], notes)
     table = SampleTable(
         problems, headers, identity, columns, _time_parser(columns["time"]),
-        columns.keys() - _NEEDED, gaps=True,
-        instead={"alt": "alt instead"} if "alt instead" in columns else {}, least=least,
+        columns.keys() - _NEEDED, gaps=True, shared=plain[identity] not in _ADDRESSES,
+        instead={"alt": "alt instead"} if "alt instead" in columns else {},
+        least=2 if stem is None else 1, repeats=plain[time] in _OF_POSITIONS,
     )  # fmt: skip
     table.notes.harmless += notes
-    for number, row in chain([] if first is None else [first], rows):
+    for number, row in chain(ahead, rows):
         if len(row) == at + 1 and not row[-1]:
             row.pop()  # a comma at the end
         if position is not None and len(row) == at:
             pair = re.split(r"[,;\s]+", row[position].strip("()[] "))
             row[position : position + 1] = pair if len(pair) == 2 else [row[position]] * 2
-        if date is not None and len(row) == len(headers) and ":" in row[time]:
+        if date is not None and len(row) >= at and ":" in row[time]:
             row[time] = f"{row[date]} {row[time]}"
+        if other != time and len(row) >= at and is_missing(row[time]):
+            row[time] = row[other]
+        if is_nameless and len(row) == len(headers) - 1:
+            row.append(str(stem))
         table.add_row(number, row)
     height = columns["alt"].header
     units = next((note.partition(": ")[0] for note in notes if f"{height} in " in note), "")
@@ -180,6 +203,29 @@ def record_rows(
     return recording
 
 
+#: How many rows may be without a time before the first that has one.
+_MOST_AHEAD = 1000
+
+
+def _until_a_time(
+    rows: Iterator[tuple[int, list[str]]], time: int, other: int
+) -> list[tuple[int, list[str]]]:
+    """Return the rows up to the first with a time, whose unit shows by it."""
+    ahead: list[tuple[int, list[str]]] = []
+    for one in rows:
+        ahead.append(one)
+        if _time_cell(one[1], time, other) or len(ahead) > _MOST_AHEAD:
+            break
+    return ahead
+
+
+def _time_cell(row: list[str], time: int, other: int) -> str:
+    for index in (time, other):
+        if len(row) > index and not is_missing(row[index]):
+            return row[index]
+    return ""
+
+
 def _seem_feet(recording: Recording) -> bool:
     """Tell whether altitudes come in steps of 25, as transponders report feet."""
     heights = np.unique(np.concatenate([one["alt"] for one in recording.samples.values()]))
@@ -187,7 +233,13 @@ def _seem_feet(recording: Recording) -> bool:
     return steps and len(heights) >= _FEW_HEIGHTS and bool(np.any(heights % 100.0))
 
 
+_KNOWN_NAMES = frozenset(_IDENTITIES)
 _KNOWN = {name for spec in COLUMNS.values() for name in spec.names}
+
+
+def known_among(headers: Iterable[str]) -> int:
+    """Return how many names of columns are of those that a table may have."""
+    return len({_name_and_unit(header)[0] for header in headers} & _KNOWN)
 
 
 def _header_and_rows(

@@ -67,6 +67,8 @@ EXTRA_COLUMNS = {
         for name in (*(f"{kind}_{axes}_std" for axes in ("ew", "ns", "en")), f"{kind}z_std")
     },
 }
+#: What such a file is called.
+DAIDALUS = "a file of DAIDALUS"
 # Extras that are no error where they cannot be read: files in the wild hold gaps there.
 _OPTIONAL = frozenset({"yaw", "airspeed"})
 
@@ -106,7 +108,7 @@ def record_daa(problems: Problems, text: str, reference: tuple[float, float, flo
         )
     assumed = next((note for note in notes if note.startswith("there is no row of units")), "")
     return table.recording(
-        None, lambda samples: _geodetic(samples, reference), kind="a file of DAIDALUS",
+        None, lambda samples: _geodetic(samples, reference), kind=DAIDALUS,
         units=assumed or "those of its row of units",
         height=columns["sz" if "sx" in columns else "alt"].header,
     )  # fmt: skip

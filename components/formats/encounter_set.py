@@ -38,7 +38,7 @@ class EncounterSet:
     `starts` (rows + 1,). `state` holds `STATE` of sets of events, `lists` the `LISTS` of the kind,
     `extra` (n,) geometry and classes as far as the file gives them. The origin is at
     `reference_deg` (latitude, longitude); altitudes are above the ellipsoid. `skipped` damaged
-    encounters were left out.
+    encounters were left out; `notes` say what was done to a file's rows.
     """
 
     source: str
@@ -53,6 +53,7 @@ class EncounterSet:
     reference_deg: tuple[float, float] = (0.0, 0.0)
     extra: dict[str, AnyArray] = field(default_factory=dict)
     skipped: int = 0
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.numbers)

@@ -6,7 +6,7 @@ k times four doubles (time in s, north, east, altitude).
 """
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from components.formats.track_files import (
     Track,
     Tracks,
     encounter_of,
+    is_track_file,
     read_paired_text,
     read_track_csv,
     read_track_matrices,
@@ -131,18 +132,24 @@ def waypoints_of(encounters: EncounterSet, dynamics: str = "euler") -> bytes:
 
 
 TEXT, TABLE, MATRIX, WAYPOINTS, SET = ".txt", ".csv", ".mat", (".bin", ".dat"), ".parquet"
+_OF_TRACKS = {TEXT, TABLE, MATRIX}
 _MOST_SAID = 20
+#: What reads a file of other tracks, given where the origin is put.
+TrackReader = Callable[[Path, tuple[float, float] | None], Tracks]
 #: Names and tracks of the aircraft of an encounter.
 _Encounter = list[tuple[str, Track]]
 
 
 def read_encounters(
-    paths: Sequence[Path], at: tuple[float, float] | None, skip_damaged: bool
+    paths: Sequence[Path],
+    at: tuple[float, float] | None,
+    skip_damaged: bool,
+    others: TrackReader | None = None,
 ) -> EncounterSet:
     """Return what is in one set, in one file of waypoints, or in files of tracks.
 
     Files of tracks are one encounter each; those of one aircraft each make an encounter two by two,
-    the ownship's first.
+    the ownship's first. `others` reads files of recorded aircraft.
     """
     kinds = {path.suffix.lower() for path in paths}
     if kinds == {SET} and len(paths) == 1:
@@ -150,12 +157,14 @@ def read_encounters(
         return encounter_set if at is None else replace(encounter_set, reference_deg=at)
     if len(paths) == 1 and kinds <= set(WAYPOINTS):
         return _waypoints(paths[0], at or (0.0, 0.0), skip_damaged)
-    if not paths or not kinds <= {TEXT, TABLE, MATRIX}:
+    if not paths or kinds & {SET, *WAYPOINTS} or (others is None and not kinds <= _OF_TRACKS):
         raise UsageError(
             f"{', '.join(map(str, paths[:5]))}: must be one set ({SET}), one file of waypoints "
-            f"({' or '.join(WAYPOINTS)}), or tracks ({TEXT}, {TABLE}, {MATRIX})"
+            f"({' or '.join(WAYPOINTS)}), or tracks ({TEXT}, {TABLE}, {MATRIX}, or any file of "
+            "recorded aircraft)"
         )
     wrong: list[str] = []
+    notes: list[str] = []
     encounters: list[_Encounter] = []
     origins: list[tuple[float, float]] = []
     numbers: list[int] = []
@@ -163,16 +172,17 @@ def read_encounters(
     number = 0
     for path in paths:
         try:
-            tracks, origin = _tracks(path, at if alone is None else alone[1][1] or at)
+            tracks, origin, said = _tracks(path, at if alone is None else alone[1][1] or at, others)
+            notes += said
             if len(tracks) == 1 and path.suffix.lower() != TEXT:
                 if alone is None:
-                    alone = path, (tracks, origin)
+                    alone = path, (tracks, origin, said)
                     continue
                 tracks, origin = [*alone[1][0], *tracks], alone[1][1]
                 alone = None
             elif alone is not None:
                 raise _one_aircraft(alone[0])
-            encounters.append(encounter_of(tracks))
+            encounters.append(encounter_of(_from_their_start(tracks)))
             numbers.append(number)
             if origin is not None:
                 origins.append(origin)
@@ -186,20 +196,35 @@ def read_encounters(
         raise EncounterSetError("\n".join(wrong[:_MOST_SAID]))
     where = at or (origins[0] if origins else (0.0, 0.0))
     weights = [1.0] * len(numbers)
-    return set_of_tracks(str(paths[0].parent), numbers, weights, encounters, where, len(wrong))
+    found = set_of_tracks(str(paths[0].parent), numbers, weights, encounters, where, len(wrong))
+    return replace(found, notes=tuple(notes))
 
 
 def _one_aircraft(path: Path) -> EncounterSetError:
     return EncounterSetError(f"{path}: has one aircraft: an ownship and an intruder are needed")
 
 
-def _tracks(path: Path, at: tuple[float, float] | None) -> Tracks:
+#: Times that are larger count from 1970, s.
+_EPOCH_S = 1e8
+
+
+def _from_their_start(tracks: list[Track]) -> list[Track]:
+    """Return the tracks of an encounter, times of a clock from its start."""
+    start_s = min(float(track[0][0]) for track in tracks)
+    if start_s < _EPOCH_S:
+        return tracks
+    return [(time_s - start_s, north, east, up) for time_s, north, east, up in tracks]
+
+
+def _tracks(path: Path, at: tuple[float, float] | None, others: TrackReader | None) -> Tracks:
     kind = path.suffix.lower()
+    if others is not None and (kind not in _OF_TRACKS or not is_track_file(path)):
+        return others(path, at)
     if kind == TABLE:
         return read_track_csv(path, at)
     if kind == MATRIX:
         return read_track_matrices(path)
-    return [track for _, track in read_paired_text(path)], None
+    return read_paired_text(path)
 
 
 def _waypoints(path: Path, at: tuple[float, float], skip_damaged: bool) -> EncounterSet:

@@ -35,22 +35,23 @@ def log_of(problems: Problems, data: bytes) -> Log | None:
         return Log("BaseStation (SBS-1) messages", _FEET, reports, callsigns)
     if not head.startswith((b"{", b"[")):
         return None
-    documents = _documents(problems, data)
+    documents = json_documents(problems, data)
     first = next(documents)
     for marks, said, units, reader in _JSON:
         if isinstance(first[1], dict) and marks <= first[1].keys():
             reports = _each(problems, chain([first], documents), marks, reader, callsigns)
             return Log(said, units, reports, callsigns)
-    problems.fail(_UNKNOWN)
+    return None
 
 
-_UNKNOWN = (
-    "is JSON of no known kind: an aircraft.json or trace_full of readsb, or OpenSky's states "
-    "are needed (the keys now and aircraft, icao and trace, or time and states)"
+UNKNOWN_JSON = (
+    "is JSON of no known kind: an aircraft.json or trace_full of readsb, OpenSky's states (the "
+    "keys now and aircraft, icao and trace, or time and states), or records with the columns of a "
+    "table are needed"
 )
 
 
-def _documents(problems: Problems, data: bytes) -> Iterator[tuple[int, Any]]:
+def json_documents(problems: Problems, data: bytes) -> Iterator[tuple[int, Any]]:
     """Give a JSON document, or those of all lines, with the lines in which they begin."""
     lines = lines_of(data, problems)
     for number, line in lines:
@@ -83,7 +84,7 @@ def _each(
     last: dict[str, Report] = {}
     for number, one in documents:
         if not isinstance(one, dict) or not marks <= one.keys():
-            problems.fail(_UNKNOWN, line=number)
+            problems.fail(UNKNOWN_JSON, line=number)
         try:
             for sample in reader(one, callsigns):
                 before = last.get(sample.name)

@@ -11,7 +11,8 @@ import numpy as np
 
 from components.flights.sampled_flight import SampledTrajectory
 from components.formats.text_rows import Problems, TrafficFile
-from dsa_des.arrays.types import FloatArray
+from components.geometry import SEMI_MAJOR_AXIS_M, unit_vectors
+from dsa_des.arrays.types import FloatArray, IntArray
 
 #: No aircraft, and no spacecraft, flies so far from one sample to the next, m/s.
 _FASTEST_MPS = 1e6
@@ -103,7 +104,10 @@ class Recording:
         self.problems.raise_if_any()
         self.notes.settle()
         notes = [*self.notes.harmless, *self.notes.warnings]
-        return TrafficFile(made[0], made[1:], start, notes, self.notes.warnings)
+        return TrafficFile(
+            made[0], made[1:], start, notes, self.notes.warnings, None, self.kind, self.units,
+            self.height,
+        )  # fmt: skip
 
     def _flight(
         self, name: str, columns: Samples, longest_gap_s: float | None
@@ -160,3 +164,67 @@ def elapsed_times(time_s: FloatArray, start_s: float) -> FloatArray:
     decimals = min(9, math.floor(-math.log10(4.0 * resolution)))
     rounded = np.round(elapsed, decimals)
     return rounded if np.all(np.diff(rounded) > 0.0) else elapsed
+
+
+# Faster than any aircraft, m/s; and how far a position may be off besides, where times are rounded.
+_FASTEST_AIRCRAFT_MPS, _SLACK_M = 1000.0, 5000.0
+# Fewer samples are positions gone wrong, and no aircraft.
+_LEAST_SAMPLES = 3
+
+
+def aircraft_of(time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray) -> IntArray:
+    """Return which aircraft each sample of one name is of, numbered from 0 by their first samples.
+
+    Samples are in the order of time. Each belongs to the aircraft whose last place is nearest if
+    one could fly from there, else to another. Samples of none that has enough are the first one's.
+    """
+    place = SEMI_MAJOR_AXIS_M * unit_vectors(np.radians(lon_deg), np.radians(lat_deg))
+    steps_m = np.linalg.norm(np.diff(place, axis=0), axis=1)
+    number = np.zeros(len(time_s), dtype=np.int64)
+    if not (steps_m > _FASTEST_AIRCRAFT_MPS * np.diff(time_s) + _SLACK_M).any():
+        return number
+    last: list[tuple[float, list[float]]] = []
+    for row, (now_s, here) in enumerate(zip(time_s.tolist(), place.tolist(), strict=True)):
+        reached = [
+            (away_m, k)
+            for k, (then_s, there) in enumerate(last)
+            if (away_m := math.dist(there, here))
+            <= _FASTEST_AIRCRAFT_MPS * (now_s - then_s) + _SLACK_M
+        ]
+        mine = min(reached)[1] if reached else len(last)
+        last[mine : mine + 1] = [(now_s, here)]
+        number[row] = mine
+    kept = np.flatnonzero(np.bincount(number) >= _LEAST_SAMPLES)
+    renamed = np.zeros(len(last), dtype=np.int64)
+    renamed[kept] = np.arange(len(kept))
+    return renamed[number]
+
+
+#: Lines and columns of each aircraft's samples, by name.
+WithLines = dict[str, tuple[IntArray, Samples]]
+
+
+def told_apart(samples: WithLines, notes: Notes) -> WithLines:
+    """Return samples with names of their own for aircraft that share one, and note each such name.
+
+    The first keeps its name, others are numbered from 2: ``"X (2)"``.
+    """
+    result: WithLines = {}
+    for name, (lines, columns) in samples.items():
+        order = np.argsort(columns["time"], kind="stable")
+        of = np.empty(len(lines), dtype=np.int64)
+        of[order] = aircraft_of(*(columns[key][order] for key in ("time", "lat", "lon")))
+        if not of.any():
+            result[name] = lines, columns
+            continue
+        names = [name]
+        while len(names) <= of.max():
+            free = (f"{name} ({k})" for k in range(len(names) + 1, len(samples) + 10**6))
+            names.append(next(one for one in free if one not in samples and one not in names))
+        for number, one in enumerate(names):
+            mine = of == number
+            result[one] = lines[mine], {key: values[mine] for key, values in columns.items()}
+        counts = [f"{one!r} with {np.count_nonzero(of == k)}" for k, one in enumerate(names)]
+        said = "aircraft, for none flies so far from one sample to the next"
+        notes.of_one(name, "shared", f"is {len(names)} {said}: {', '.join(counts)} samples")
+    return result

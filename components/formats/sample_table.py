@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from components.arguments.units import FOOT_M
-from components.formats.recording import Notes, Recording
+from components.formats.recording import Notes, Recording, told_apart
 from components.formats.sample_columns import SampleColumn, is_missing
 from components.formats.text_rows import MOST_OF_A_CELL, MOST_PROBLEMS, Problems, TrafficFile
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -25,8 +25,7 @@ _LIMITS = {
     "sy": (-4e6, 4e6, "lie within ±4,000 km"),
     "sz": (-1e4, 1e6, "lie in [-10000, 1000000] metres"),
 }
-# A file in which no aircraft is seen for longer than this has a wrong time in it: a run would
-# simulate the years in between.
+# A file in which no aircraft is seen for longer has a wrong time in it: a run would last years.
 _LONGEST_SILENCE_S = 86400.0
 
 #: A pressure altitude differs by less from a height in the weather of most days.
@@ -52,8 +51,10 @@ class SampleTable:
     and a note says so. With `gaps`, neither is a row without a time or a position: it is left out
     and counted; an aircraft that has no number at all in one column takes those of the column that
     `instead` names for it; and rows of an aircraft that say the same of an instant are one sample.
-    That an aircraft has none of a `seldom` column is not worth a word. `parse_time` reads a time
-    cell where a plain number will not do.
+    With `shared` names several aircraft may have one (`told_apart`). Where a position `repeats`
+    until the next one comes, its height need not be the same. That an aircraft has none of a
+    `seldom` column is not worth a word. `parse_time` reads a time cell where a plain number will
+    not do.
     """
 
     def __init__(
@@ -66,12 +67,16 @@ class SampleTable:
         optional: Collection[str] = (),
         *,
         gaps: bool = False,
+        shared: bool = False,
         instead: Mapping[str, str] | None = None,
         rows: str = "rows",
         least: int = 2,
         seldom: Collection[str] = (),
+        repeats: bool = False,
     ) -> None:
+        self._repeats = repeats
         self._kind_of_rows, self._least, self._seldom = rows, least, frozenset(seldom)
+        self._shared = shared
         self._instead = dict(instead or {})
         self._optional = frozenset(optional) - self._instead.keys() - {*self._instead.values()}
         self._problems, self._name_column, self._columns = problems, name_column, columns
@@ -147,6 +152,11 @@ class SampleTable:
             return math.nan
         return self._number(line, quantity, self._columns[quantity], cell)
 
+    def of_second(self, key: str) -> int | None:
+        """Return how many aircraft have the second column of two; None for all of them."""
+        whom = len(self._second.get(key, []))
+        return None if whom and whom >= self._kept else whom
+
     def recording(self, ownship: str | None, to_geodetic: Converter, **said: Any) -> Recording:
         """Check each aircraft's samples and return them; `said` is what `Recording` says of it."""
         samples = {name: to_geodetic(one) for name, one in self.samples(ownship).items()}
@@ -159,6 +169,8 @@ class SampleTable:
     def samples(self, ownship: str | None) -> dict[str, dict[str, FloatArray]]:
         """Check each aircraft's samples and return them as columns, in the order of time."""
         kept = self._without_gaps()
+        if self._shared:
+            kept = told_apart(kept, self.notes)
         names = list(kept)
         if not names:
             self._problems.fail("there are no samples: at least two aircraft are needed")
@@ -212,6 +224,7 @@ class SampleTable:
                     )  # fmt: skip
                     del columns[key]
             kept[name] = lines, columns
+        self._kept = len(kept)
         self._note_second_columns()
         if left_out:
             of = self._kind_of_rows[:-1] + " was" if left_out == 1 else f"{self._kind_of_rows} were"
@@ -300,13 +313,13 @@ class SampleTable:
             )
             lines = lines[order]
             columns = {key: values[order] for key, values in columns.items()}
-        where = [values for key, values in columns.items() if key not in self._optional]
+        apart = self._optional | ({"alt"} if self._repeats else frozenset())
+        where = [values for key, values in columns.items() if key not in apart]
         again = np.all([values[1:] == values[:-1] for values in where], axis=0) & self._gaps
         if again.any():
             count = int(np.count_nonzero(again))
-            self.notes.of_one(
-                name, "again", f"{count} of its samples stand there again and count once"
-            )
+            said = f"{count} of its samples stand there again and count once"
+            self.notes.of_one(name, "again", said, harmless=self._repeats)
             once = np.concatenate([[True], ~again])
             lines, columns = lines[once], {key: values[once] for key, values in columns.items()}
         times, header = columns["time"], self._columns["time"].header

@@ -134,6 +134,10 @@ class TrafficFile:
     warnings: list[str] = field(default_factory=list)
     #: When what was chosen of it ends.
     end_s: float | None = None
+    #: What the file is, in which units it says things, and which height was read.
+    kind: str = ""
+    units: str = ""
+    height: str = ""
 
     @property
     def aircraft(self) -> list[SampledTrajectory]:

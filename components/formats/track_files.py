@@ -40,8 +40,8 @@ _COMPRESSED = 15
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 #: Time (s), north, east and altitude (m) of one aircraft.
 Track = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
-#: Tracks of one file, and where their origin is if that is known.
-Tracks = tuple[list[Track], tuple[float, float] | None]
+#: Tracks of one file, where their origin is if that is known, and what was done to its rows.
+Tracks = tuple[list[Track], tuple[float, float] | None, list[str]]
 
 
 def _wrong(path: Path, message: str, line: int | None = None) -> EncounterSetError:
@@ -69,6 +69,17 @@ def _numbers(path: Path, line: int, cells: Sequence[str]) -> list[float]:
     return values
 
 
+def is_track_file(path: Path) -> bool:
+    """Tell whether a file is one of these formats, or cannot be told from them."""
+    if path.suffix.lower() == ".mat":
+        return True
+    try:
+        names = {*re.split(r"[,;\s]+", read_input_text(path)[:4096].split("\n")[0])}
+    except InputFileError:
+        return True
+    return any(len(names & {*wanted}) >= len(wanted) - 1 for wanted in (_PAIRED, _GEODETIC, _PLANE))
+
+
 def _indices(path: Path, names: Sequence[str], wanted: Sequence[str]) -> list[int]:
     for name in wanted:
         if name not in names:
@@ -91,13 +102,12 @@ def read_track_csv(path: Path, at: tuple[float, float] | None = None) -> Tracks:
         rows_of.setdefault(name, []).append(values)
     if not rows_of:
         raise _wrong(path, "a row of column names and rows of samples are needed")
-    tracks = [np.array(samples).T for samples in rows_of.values()]
-    for name, samples in zip(rows_of, tracks, strict=True):
-        _rising(path, name, samples[0])
+    notes: list[str] = []
+    tracks = [_in_order(path, n, np.array(rows).T, notes) for n, rows in rows_of.items()]
     if wanted is _PLANE:
-        return [_feet(t, x, y, z) for t, x, y, z in tracks], None
+        return [_feet(t, x, y, z) for t, x, y, z in tracks], None, notes
     origin = at or (float(tracks[0][1, 0]), float(tracks[0][2, 0]))
-    return [_in_plane(samples, origin) for samples in tracks], origin
+    return [_in_plane(samples, origin) for samples in tracks], origin, notes
 
 
 def _in_plane(samples: FloatArray, origin: tuple[float, float]) -> Track:
@@ -192,18 +202,34 @@ def read_track_matrices(path: Path) -> Tracks:
             f"{path}: holds no matrix of {_ROWS} rows (time in s, north, east, altitude in ft, "
             "velocities), one for each aircraft"
         )
+    notes: list[str] = []
+    tracks: list[Track] = []
     for k, matrix in enumerate(matrices):
         if not np.isfinite(matrix[:4]).all():
             raise EncounterSetError(f"{path}: aircraft {k + 1}: holds something else than numbers")
         if matrix[0, 0] < 0.0:
             raise EncounterSetError(f"{path}: aircraft {k + 1}: time is negative")
-        _rising(path, f"aircraft {k + 1}", matrix[0])
-    return [_feet(*matrix[:4]) for matrix in matrices], None
+        tracks.append(_feet(*_in_order(path, f"aircraft {k + 1}", matrix[:4], notes)))
+    return tracks, None, notes
 
 
-def _rising(path: Path, name: str, time_s: FloatArray) -> None:
-    if (np.diff(time_s) <= 0.0).any():
-        raise EncounterSetError(f"{path}: {name or 'the track'}: times must rise")
+def _in_order(path: Path, name: str, samples: FloatArray, notes: list[str]) -> FloatArray:
+    """Return samples (columns, n), the time first, by time; those that stand there again once."""
+    name = name or "the track"
+    order = np.argsort(samples[0], kind="stable")
+    if (order[1:] < order[:-1]).any():
+        notes.append(f"{path}: {name}: rows were not in the order of time and have been sorted")
+        samples = samples[:, order]
+    again = (samples[:, 1:] == samples[:, :-1]).all(axis=0)
+    if again.any():
+        count = int(np.count_nonzero(again))
+        notes.append(f"{path}: {name}: {count} of its samples stand there again and count once")
+        samples = samples[:, np.append(True, ~again)]
+    twice = np.flatnonzero(np.diff(samples[0]) <= 0.0)
+    if len(twice):
+        when_s = samples[0, twice[0]]
+        raise EncounterSetError(f"{path}: {name}: it is at two places at {when_s:.15g} s")
+    return samples
 
 
 def _feet(time_s: FloatArray, north: FloatArray, east: FloatArray, up: FloatArray) -> Track:
@@ -216,7 +242,7 @@ def encounter_of(tracks: list[Track]) -> list[tuple[str, Track]]:
     return list(zip(names, tracks, strict=False))
 
 
-def read_paired_text(path: Path) -> list[tuple[str, Track]]:
+def read_paired_text(path: Path) -> Tracks:
     """Read one encounter of paired tracks: a row of names, one of units, and samples."""
     names, rows = _table(path)
     indices = _indices(path, names, _PAIRED)
@@ -235,9 +261,10 @@ def read_paired_text(path: Path) -> list[tuple[str, Track]]:
         )
     if len(rows_of) < 2:
         raise _wrong(path, "has one aircraft: an ownship and an intruder are needed")
-    encounter = []
+    notes: list[str] = []
+    tracks: list[Track] = []
     for name, samples in rows_of.items():
-        time_s, east, north, up = np.array(samples).T * np.array(factors)[:, np.newaxis]
-        _rising(path, name, time_s)
-        encounter.append((name.lower(), (time_s, north, east, up)))
-    return encounter
+        columns = np.array(samples).T * np.array(factors)[:, np.newaxis]
+        time_s, east, north, up = _in_order(path, name, columns, notes)
+        tracks.append((time_s, north, east, up))
+    return tracks, None, notes

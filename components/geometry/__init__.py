@@ -71,6 +71,12 @@ from components.geometry.ellipsoid import (
     spherical_from_enu,
 )
 from components.geometry.field_of_view import FieldOfView, rising_sector, sector_width_rad
+from components.geometry.meridians import (
+    NEAR_A_POLE_DEG,
+    level_parts,
+    turn_of_north_rad,
+    turned_by_meridians,
+)
 from components.geometry.sensor_axes import (
     sensor_angles,
     sensor_angles_of_offsets,

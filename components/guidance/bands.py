@@ -5,7 +5,7 @@ the end is written state by state.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -126,6 +126,8 @@ def away(own_value: float, edge: float, cyclic: bool) -> float:
 _PAINTED = ("NEAR", "MID", "FAR")
 # States taken together: their arrays stay in the cache.
 _MOST_AT_ONCE = {"hdir": 32, "hs": 64, "vs": 64, "alt": 128}
+# So many times as many are held until they are painted.
+_PARTS_AT_ONCE = 8
 
 
 class Guidance(NamedTuple):
@@ -196,45 +198,68 @@ def guidance_of_many(
         several items.
     """
     made: list[Guidance] = []
-    at_once = _MOST_AT_ONCE[kind_name]
-    for start in range(0, len(own.up_m), at_once):
-        rows = np.arange(start, min(start + at_once, len(own.up_m)))
-        part = [intruder.rows(rows) for intruder in intruders]
-        made += _guidance_of(kind_name, configuration, own.rows(rows), part)
+    for block in _parts(np.arange(len(own.up_m)), _MOST_AT_ONCE[kind_name] * _PARTS_AT_ONCE):
+        parts = []
+        for rows in _parts(block, _MOST_AT_ONCE[kind_name]):
+            theirs = [intruder.rows(rows) for intruder in intruders]
+            parts.append(_Part(kind_name, configuration, own.rows(rows), theirs))
+        # A search takes as many steps whatever it holds, so those of all parts are one.
+        stuck = np.concatenate([part.saturated for part in parts])
+        recoveries: list[tuple[Recovery, list[Interval]]] = []
+        if configuration[f"recovery_{kind_name}"]:
+            for rows in _parts(block[stuck], _MOST_AT_ONCE[kind_name]):
+                theirs = [intruder.rows(rows) for intruder in intruders]
+                recoveries += recover(kind_name, configuration, own.rows(rows), theirs)
+        ways = iter(recoveries)
+        for part in parts:
+            made += part.painted(ways if recoveries else None)
     return made
+
+
+def _parts(rows: IntArray, most: int) -> list[IntArray]:
+    return [rows[start : start + most] for start in range(0, len(rows), most)]
 
 
 def _one(state: State) -> State:
     return State(*(np.asarray(part, dtype=np.float64).reshape(1) for part in state))
 
 
-def _guidance_of(
-    kind_name: str, configuration: Configuration, own: State, intruders: list[GuidedIntruders]
-) -> list[Guidance]:
-    kind = kind_of(kind_name, own, configuration)
-    regions = Regions(configuration, kind, own, intruders)
-    layers: list[tuple[str, BoolArray, BoolArray]] = []  # region, of whom, clear values
-    on = np.ones(len(own.up_m), dtype=bool)
-    saturated = np.zeros(len(on), dtype=bool)
-    corrective = REGIONS.index(configuration["corrective_region"])
-    for region in _PAINTED:
-        known, clear = regions.clear(region)
-        layers.append((region, on & known, clear))
-        stuck = on & known & ~regions.leads(clear)
-        if REGIONS.index(region) >= corrective:
-            saturated |= stuck
-        on = on & ~stuck
-    recoveries: dict[int, tuple[Recovery, list[Interval]]] = {}
-    rows = np.flatnonzero(saturated)
-    if len(rows) and configuration[f"recovery_{kind_name}"]:
-        theirs = [intruder.rows(rows) for intruder in intruders]
-        recovered = recover(kind_name, configuration, own.rows(rows), theirs)
-        recoveries = dict(zip(rows.tolist(), recovered, strict=True))
-    at_once: IntArray = np.zeros(0, dtype=np.int64)
-    if kind.instantaneous:
-        at_once = np.flatnonzero(regions.inside_corrective())
-    painter = _Painter(configuration, kind, layers, own.up_m)
-    return [painter.guidance(row, recoveries.get(row), row in at_once) for row in range(len(on))]
+class _Part:
+    """Some states, of whom it is known what is clear of the volumes, and who finds no way."""
+
+    def __init__(
+        self,
+        kind_name: str,
+        configuration: Configuration,
+        own: State,
+        intruders: list[GuidedIntruders],
+    ) -> None:
+        kind = kind_of(kind_name, own, configuration)
+        regions = Regions(configuration, kind, own, intruders)
+        layers: list[tuple[str, BoolArray, BoolArray]] = []  # region, of whom, clear values
+        on = np.ones(len(own.up_m), dtype=bool)
+        self.saturated = np.zeros(len(on), dtype=bool)
+        corrective = REGIONS.index(configuration["corrective_region"])
+        for region in _PAINTED:
+            known, clear = regions.clear(region)
+            layers.append((region, on & known, clear))
+            stuck = on & known & ~regions.leads(clear)
+            if REGIONS.index(region) >= corrective:
+                self.saturated |= stuck
+            on = on & ~stuck
+        self._at_once = np.zeros(len(on), dtype=bool)
+        if kind.instantaneous:
+            self._at_once = regions.inside_corrective()
+        self._painter = _Painter(configuration, kind, layers, own.up_m)
+
+    def painted(self, ways: Iterator[tuple[Recovery, list[Interval]]] | None) -> list[Guidance]:
+        """Return the bands, with the next of the `ways` of recovery for each that is saturated."""
+        return [
+            self._painter.guidance(row, next(ways) if stuck and ways else None, at_once)
+            for row, (stuck, at_once) in enumerate(
+                zip(self.saturated.tolist(), self._at_once.tolist(), strict=True)
+            )
+        ]
 
 
 class _Painter:

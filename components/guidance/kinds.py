@@ -121,9 +121,6 @@ def _speed_steps(name: str, own: State, values: Any) -> Steps:
     )  # fmt: skip
 
 
-_MOST = np.iinfo(np.int64).max
-
-
 class StepConflicts:
     """When the flights after all steps meet a volume about one intruder of each ownship.
 
@@ -182,11 +179,12 @@ class StepConflicts:
     def _beyond(self, met: BoolArray) -> BoolArray:
         if not met.any():
             return met
-        number = self._steps.number
-        lost = np.zeros(met.shape, dtype=bool)
-        for side in (number >= 0, number <= 0):
-            first = np.where(met & side, self._count, _MOST).min(axis=1, initial=_MOST)
-            lost |= side & (self._count >= first[:, np.newaxis])
+        # Outwards to either side, from no manoeuvre on.
+        own, lost = int(-self._steps.number[0]), np.empty(met.shape, dtype=bool)
+        for met_outwards, lost_outwards in (
+            (met[:, own:], lost[:, own:]), (met[:, own::-1], lost[:, own::-1])
+        ):  # fmt: skip
+            np.logical_or.accumulate(met_outwards, axis=1, out=lost_outwards)
         return lost
 
 

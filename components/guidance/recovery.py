@@ -1,6 +1,7 @@
 """The earliest way out of a violation that cannot be avoided."""
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from components.guidance.kinds import Conflicts, kind_of
 from components.guidance.regions import GuidedIntruders, Regions, any_interval, intervals_of
 from components.guidance.situation import Detector, State
 from components.well_clear.tcas import recovery_sizes_m
-from dsa_des.arrays.types import BoolArray, FloatArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 # The search for the earliest recovery ends when it is known this well, s.
 _SEARCHED_S = 0.5
@@ -51,12 +52,12 @@ def recovery_cylinder(configuration: Configuration, altitude_m: FloatArray) -> S
     return result[0], result[1]
 
 
-def _of_row(sizes: Sizes, row: int) -> tuple[float, float]:
+def _of_row(sizes: FloatArray, row: int) -> tuple[float, float]:
     return float(sizes[0][row]), float(sizes[1][row])
 
 
 class _Search:
-    """The search of r ownships; rows for whom it has ended are left as they are."""
+    """The search of r ownships."""
 
     def __init__(
         self,
@@ -65,6 +66,7 @@ class _Search:
         own: State,
         intruders: list[GuidedIntruders],
     ) -> None:
+        self._kind_name, self._own = kind_name, own
         self._configuration = configuration
         self._lookahead_s: float = configuration["lookahead_time"]
         # Release 2.0.1 finds no recovery that begins later than the early time of its last level:
@@ -88,39 +90,66 @@ class _Search:
         nmac = values["horizontal_nmac"], values["vertical_nmac"]
         count = len(self._kind.own_value)
         result: list[tuple[Recovery, list[Interval]] | None] = [None] * count
-        self._try((np.full(count, nmac[0]), np.full(count, nmac[1])))
+        sizes, shrinks = np.array(self._sizes), np.zeros(count, dtype=np.int64)
+
+        def smaller(rows: IntArray) -> IntArray:
+            """Make the cylinders of rows smaller; return those of whom another is looked at."""
+            ends = np.ones(len(rows), dtype=bool)
+            if values["ca_bands"]:
+                reduced = sizes[:, rows] * (1.0 - values["ca_factor"])
+                sizes[:, rows] = np.maximum(np.array(nmac)[:, np.newaxis], reduced)
+                shrinks[rows] += 1
+                # That of a collision is not looked at again: there is neither a time nor a way.
+                ends = (sizes[0, rows] <= nmac[0]) & (sizes[1, rows] <= nmac[1])
+            for row in rows[ends].tolist():
+                result[row] = Recovery(-math.inf, _of_row(sizes, row), int(shrinks[row])), []
+            return rows[~ends]
+
+        self._try(np.repeat(nmac, count).reshape(2, count))
         on = self._leads(self._clear_of_cylinder())
         for row in np.flatnonzero(~on).tolist():
             result[row] = Recovery(-math.inf, nmac, 0), []
-        sizes = self._sizes
-        shrinks = 0
-        while on.any():
-            self._try(sizes)
-            leads = on & self._leads(self._clear_of_cylinder())
-            if leads.any():
-                time_s = self._earliest(leads)
-                clear = self._clear_at(time_s[:, np.newaxis])
-                leads &= self._leads(clear) & (time_s <= self._latest_s)
-                for row in np.flatnonzero(leads).tolist():
-                    recovery = Recovery(float(time_s[row]), _of_row(sizes, row), shrinks)
-                    result[row] = recovery, intervals_of(self._kind, row, clear)
-                on = on & ~leads
-            ends = on
-            if values["ca_bands"]:
-                factor = 1.0 - values["ca_factor"]
-                sizes = (
-                    np.maximum(nmac[0], sizes[0] * factor),
-                    np.maximum(nmac[1], sizes[1] * factor),
-                )
-                shrinks += 1
-                # That of a collision is not looked at again: there is neither a time nor a way.
-                ends = on & (sizes[0] <= nmac[0]) & (sizes[1] <= nmac[1])
-            for row in np.flatnonzero(ends).tolist():
-                result[row] = Recovery(-math.inf, _of_row(sizes, row), shrinks), []
-            on = on & ~ends
+        todo = np.flatnonzero(on)
+        while len(todo):
+            rows = self._rows_with_a_way(todo, sizes, smaller)
+            if not len(rows):
+                break
+            part = self._of(rows)
+            part._try(sizes[:, rows])
+            time_s = part._earliest()
+            clear = part._clear_at(time_s[:, np.newaxis])
+            found = part._leads(clear) & (time_s <= self._latest_s)
+            for index in np.flatnonzero(found).tolist():
+                row = int(rows[index])
+                recovery = Recovery(float(time_s[index]), _of_row(sizes, row), int(shrinks[row]))
+                result[row] = recovery, intervals_of(part._kind, index, clear)
+            todo = smaller(rows[~found])
         return [one for one in result if one is not None]
 
-    def _try(self, sizes: Sizes) -> None:
+    def _rows_with_a_way(
+        self, rows: IntArray, sizes: FloatArray, smaller: Callable[[IntArray], IntArray]
+    ) -> IntArray:
+        """Return the rows whose cylinders leave a way, each as small as it takes."""
+        led: list[IntArray] = []
+        search, on = self._of(rows), np.ones(len(rows), dtype=bool)
+        while on.any():
+            if 2 * np.count_nonzero(on) <= len(on):  # what has ended for most is left behind
+                rows = rows[on]
+                search, on = self._of(rows), on[on]
+            search._try(sizes[:, rows])
+            leads = on & search._leads(search._clear_of_cylinder())
+            led.append(rows[leads])
+            on = np.isin(rows, smaller(rows[on & ~leads]))
+        return np.sort(np.concatenate([*led, np.empty(0, dtype=np.int64)]))
+
+    def _of(self, rows: IntArray) -> "_Search":
+        """Return the search of some rows, ascending: this one of all."""
+        if len(rows) == len(self._kind.own_value):
+            return self
+        intruders = [intruder.rows(rows) for intruder in self._intruders]
+        return _Search(self._kind_name, self._configuration, self._own.rows(rows), intruders)
+
+    def _try(self, sizes: Sizes | FloatArray) -> None:
         """Look at cylinders of sizes (r,)."""
         detector = Detector(cylinder_m=(sizes[0][:, np.newaxis], sizes[1][:, np.newaxis]))
         self._cylinders = [
@@ -155,11 +184,12 @@ class _Search:
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return clear
 
-    def _earliest(self, on: BoolArray) -> FloatArray:
+    def _earliest(self) -> FloatArray:
         """Return the earliest time from which on the volume is clear, with that of stability."""
-        count = len(on)
+        count = len(self._kind.own_value)
         red, green = np.zeros(count), np.full(count, self._lookahead_s + 1.0)
         probe = np.full(count, self._lookahead_s)
+        on = np.ones(count, dtype=bool)
         while on.any():
             leads = self._leads(self._clear_at(probe[:, np.newaxis]))
             green = np.where(on & leads, probe, green)

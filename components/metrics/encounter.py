@@ -90,6 +90,12 @@ class SizeParameters(Parameters):
             (self.nmac_horizontal_m, self.nmac_vertical_m),
         )
 
+    def cylinders_m(self, kind: str = "") -> dict[str, tuple[float, float]]:
+        """Return radius and half height of the events that are cylinders, by name and `kind`."""
+        lost, nmac = self.sizes_m
+        clear = {} if self.tau_s else {f"well_clear_lost{kind}": lost}
+        return {**clear, f"nmac{kind}": nmac}
+
     def losses_s(self, runs: Sequence[list[RelativeFlight]]) -> FloatArray:
         """Return when well clear is first lost, when a collision first threatens, and 0, s."""
         return losses_s(self.sizes_m, runs, self.tau_s)
@@ -167,6 +173,11 @@ class WellClear(_Encounter):
     """
 
     Parameters = WellClearParameters
+
+    def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
+        """Return the sizes of both events, of well clear where no time counts."""
+        cylinders: dict[str, tuple[float, float]] = self.p.cylinders_m()
+        return cylinders
 
     def results(self) -> list[Result]:
         """Return both events, when well clear is lost, and the warning per sensor."""

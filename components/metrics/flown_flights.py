@@ -9,6 +9,7 @@ import numpy as np
 
 from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.messages.steering import Manoeuvre
+from components.metrics.losses import first_within_s
 from components.metrics.rows import TargetMetric
 from components.metrics.separation import (
     RelativeFlight,
@@ -20,6 +21,12 @@ from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import Group
 
 _COLUMNS = Manoeuvre._fields
+
+# Scores → levels that a pilot may choose, falling to the event: from 128 s and 512 sizes.
+_SCORES: dict[str, FloatArray] = {
+    "time_to_go": np.append(2.0 ** (np.arange(56, -9, -1) / 8.0), 0.0),
+    "separation": 2.0 ** (np.arange(72, -1, -1) / 8.0),
+}
 
 #: Manoeuvres and when they came, s, in order.
 Steering = Sequence[tuple[float, Manoeuvre]]
@@ -43,6 +50,8 @@ class FlownMetric(TargetMetric):
     Refused where manoeuvres reach the traffic block by wires of any but a fixed delay.
     """
 
+    scores = _SCORES
+
     def __init__(self, parameters: Any, scene: Scene, *, steered: bool = True) -> None:
         super().__init__(parameters, scene)
         traffic = traffic_block(scene).name
@@ -62,7 +71,14 @@ class FlownMetric(TargetMetric):
 
     def manoeuvres(self, group: Group) -> Mapping[int, Steering]:
         """Return the manoeuvres of every replica of a group that has any."""
-        result: dict[int, list[tuple[float, Manoeuvre]]] = {}
+        return {k: [one[1:] for one in mine] for k, mine in self._told(group).items()}
+
+    def _told(self, group: Group) -> Mapping[int, list[tuple[float, float, Manoeuvre]]]:
+        """Return when each manoeuvre of every replica that has any was told, came, and what it was.
+
+        In order of coming; what is told is known when all before it is.
+        """
+        result: dict[int, list[tuple[float, float, Manoeuvre]]] = {}
         if not self.delays_s:
             return result
         table: Any = group.tables["manoeuvres"]
@@ -76,15 +92,65 @@ class FlownMetric(TargetMetric):
                 continue
             came_s = time_s + self.delays_s[names[block]]
             if came_s < group.duration_s[replica]:
-                result.setdefault(replica, []).append((came_s, Manoeuvre(*values)))
-        return {replica: sorted(mine, key=lambda one: one[0]) for replica, mine in result.items()}
+                result.setdefault(replica, []).append((time_s, came_s, Manoeuvre(*values)))
+        for replica, mine in result.items():
+            mine.sort(key=lambda one: one[1])
+            told_s = np.maximum.accumulate([one[0] for one in mine]).tolist()
+            result[replica] = [(t, *one[1:]) for t, one in zip(told_s, mine, strict=True)]
+        return result
 
     def of_flights(
-        self, group: Group, read: "Read", *, steered: bool = True, to_the_end: bool = False
+        self,
+        group: Group,
+        read: "Read",
+        *,
+        steered: bool = True,
+        to_the_end: bool = False,
+        some: IntArray | None = None,
     ) -> FloatArray:
-        """Return what `read` makes of every replica's flights, (values, replicas)."""
-        runs, run_of = self._flights(group, steered, to_the_end)
+        """Return what `read` makes of the flights of `some` replicas, or all, (values, those)."""
+        runs, run_of = self._flights(group, steered, to_the_end, some)
         return read(runs)[:, run_of]
+
+    def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
+        """Return of each event that is a cylinder about the ownship its radius and half height."""
+        return {}
+
+    def scored_events(self) -> Sequence[str]:
+        """Return those events, where the ownship is steered."""
+        return list(self.cylinders_m()) if self.delays_s else []
+
+    def reached_s(
+        self, group: Group, event: str, score: str, levels: Sequence[float]
+    ) -> FloatArray:
+        """Return when runs first reach levels of a score of an event's cylinder.
+
+        ``separation`` is the least distance of a target so far, in sizes of the cylinder.
+        ``time_to_go`` is the least time so far that was left until the event if nothing more were
+        told to the ownship, s. A manoeuvre is decided while aircraft are far apart and shows in
+        their distance much later; the time to go parts runs by what is still open.
+        """
+        radius_m, half_m = self.cylinders_m()[event]
+        if score == "separation":
+            limits_m = [(level * radius_m, level * half_m) for level in levels]
+            return self.of_flights(group, partial(first_within_s, limits_m), to_the_end=True)
+        told = self._told(group)
+        result = np.full((len(levels), len(group)), np.inf)
+        for count in range(1 + max(map(len, told.values()), default=0)):
+            # As if no more than so many manoeuvres were told: known from when the last of them is.
+            some = np.array([k for k in range(len(group)) if len(told.get(k, ())) >= count])
+            steering = {k: [one[1:] for one in mine[:count]] for k, mine in told.items()}
+            runs, run_of = flights_of(group, self.p.step_s, None, steering)
+            used, mine = np.unique(run_of[some], return_inverse=True)
+            event_s = first_within_s([(radius_m, half_m)], [runs[k] for k in used])[0, mine]
+            known = [(0.0, *(one[0] for one in told.get(k, ())), math.inf) for k in some.tolist()]
+            from_s, until_s = np.array([times[count : count + 2] for times in known]).T
+            for number, level in enumerate(levels):
+                at_s = np.fmax(from_s, event_s - level)
+                reached = (at_s < np.minimum(until_s, group.duration_s[some])) & ~np.isnan(event_s)
+                better = np.where(reached, at_s, np.inf)
+                result[number, some] = np.minimum(result[number, some], better)
+        return np.where(np.isinf(result), np.nan, result)
 
     def of_each_flight(
         self, group: Group, read: "Read", *, to_the_end: bool = False
@@ -104,11 +170,11 @@ class FlownMetric(TargetMetric):
         return names, result[:, run_of]
 
     def _flights(
-        self, group: Group, steered: bool, to_the_end: bool
+        self, group: Group, steered: bool, to_the_end: bool, some: IntArray | None = None
     ) -> tuple[list[list[RelativeFlight]], IntArray]:
         steering = self.manoeuvres(group) if steered else None
         target = getattr(self.p, "target", None)
-        return flights_of(group, self.p.step_s, target, steering, to_the_end=to_the_end)
+        return flights_of(group, self.p.step_s, target, steering, to_the_end=to_the_end, some=some)
 
 
 #: What is read of runs, each a list of its flights: (values, runs).
@@ -127,13 +193,14 @@ def flights_of(
     steering: Mapping[int, Steering] | None = None,
     *,
     to_the_end: bool = False,
+    some: IntArray | None = None,
 ) -> tuple[list[list[RelativeFlight]], IntArray]:
-    """Return the flights of runs that differ, and which of these each replica is.
+    """Return the flights of runs that differ, and which of these each of `some` replicas is.
 
-    Flights are computed once for all replicas that share them. Distances are taken every `step_s`;
-    None looks between them for losses. A target of None is all of them. The ownship of a replica
-    flies as `steering` says, if anything. A run that ended early is looked at `to_the_end` of it,
-    or as long as it was meant to last.
+    All are by default. Flights are computed once for all replicas that share them. Distances are
+    taken every `step_s`; None looks between them for losses. A target of None is all of them. The
+    ownship of a replica flies as `steering` says, if anything. A run that ended early is looked at
+    `to_the_end` of it, or as long as it was meant to last.
     """
     steering = steering or {}
     traffic = traffic_block(group.scene)
@@ -143,8 +210,10 @@ def flights_of(
         cls.prepare(group.parameters_of(traffic.name))
     runs: list[list[RelativeFlight]] = []
     known: dict[Any, int] = {}
+    numbers = range(len(group)) if some is None else some.tolist()
     run_of, steered = np.empty(len(group), dtype=np.int64), []
-    for number, replica in enumerate(group.replicas):
+    for number in numbers:
+        replica = group.replicas[number]
         mine = {k: v for k, v in replica.changes.items() if k.startswith((block, "duration_s"))}
         until_s = math.inf
         if to_the_end and group.ended_early[number]:
@@ -166,4 +235,4 @@ def flights_of(
     )
     for number, own in zip(steered, flown, strict=True):
         runs[run_of[number]] = [flight.flown_by(own) for flight in runs[run_of[number]]]
-    return runs, run_of
+    return runs, run_of if some is None else run_of[some]

@@ -222,6 +222,22 @@ def losses_s(
     return result
 
 
+def first_within_s(
+    limits_m: Sequence[tuple[float, float]], runs: Sequence[list[RelativeFlight]]
+) -> FloatArray:
+    """Return when the first target of each run is within each (horizontal, vertical), s.
+
+    (limits, runs); NaN for never. Limits fall.
+    """
+    flights = [flight for run in runs for flight in run]
+    of_run = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
+    first = first_losses_s(flights, *limits_m)
+    result = np.full((len(limits_m), len(runs)), np.nan)
+    for number in range(len(limits_m)):
+        np.fmin.at(result[number], of_run, first[:, number])
+    return result
+
+
 def _of_some(at: Any, some: IntArray, flight: IntArray, time_s: FloatArray) -> Any:
     return at(some[flight], time_s)
 

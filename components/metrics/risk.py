@@ -17,7 +17,7 @@ from components.metrics.flown_flights import FlownMetric, each_alone
 from components.metrics.rows import TargetParameters
 from components.metrics.separation import RelativeFlight, relative_states, traffic_block
 from components.well_clear.severity import collision_probability, loss_severity
-from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, FRACTION, NUMBER, Group, Result
@@ -31,6 +31,8 @@ RiskRatio = PairedRatio
 risk_ratio = paired_ratio
 risk_ratios_by_class = ratios_by_class
 
+#: By the sizes of their volumes.
+_EVENTS = ("well_clear_lost", "nmac")
 # The best of the grid is looked at again with this much finer steps to both sides.
 _FINER = 50
 
@@ -57,26 +59,42 @@ class Mitigated(FlownMetric):
         sizes = self.p.sizes_m
         return [
             Result(f"{name}_{which}", EVENT, f"{how} within {radius:g} m and {half:g} m")
-            for name, (radius, half) in zip(("well_clear_lost", "nmac"), sizes, strict=True)
+            for name, (radius, half) in zip(_EVENTS, sizes, strict=True)
             for which, how in (("nominal", "without manoeuvres,"), ("mitigated", "as steered,"))
         ]
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return all of it for every replica."""
-        return {**self.losses(group, steered=False), **self.losses(group, steered=True)}
+        """Return all of it for every replica: whoever is told nothing flies as without."""
+        nominal = self.nominal(group)
+        mitigated = {name: nominal[f"{name}_nominal"].copy() for name in _EVENTS}
+        told = np.array(sorted(self.manoeuvres(group)), dtype=np.int64)
+        if len(told):
+            for name, flags in self.losses(group, steered=True, some=told).items():
+                mitigated[name][told] = flags
+        return {**nominal, **{f"{name}_mitigated": of for name, of in mitigated.items()}}
 
-    def losses(self, group: Group, *, steered: bool) -> Mapping[str, AnyArray]:
-        """Return both events of every replica's flights, nominal or as steered."""
-        which = "mitigated" if steered else "nominal"
-        lost_s, collision_s, _ = self.of_flights(group, self.p.losses_s, steered=steered)
+    def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
+        """Return the sizes of the events as steered."""
+        cylinders: dict[str, tuple[float, float]] = self.p.cylinders_m("_mitigated")
+        return cylinders
+
+    def nominal(self, group: Group) -> dict[str, AnyArray]:
+        """Return both events of every replica's flights without manoeuvres."""
+        return {f"{name}_nominal": of for name, of in self.losses(group, steered=False).items()}
+
+    def losses(
+        self, group: Group, *, steered: bool, some: IntArray | None = None
+    ) -> dict[str, AnyArray]:
+        """Return both events of the flights of some replicas, or all, nominal or as steered."""
+        lost_s, collision_s, _ = self.of_flights(group, self.p.losses_s, steered=steered, some=some)
         return {
-            f"well_clear_lost_{which}": (~np.isnan(lost_s)).astype(float),
-            f"nmac_{which}": (~np.isnan(collision_s)).astype(float),
+            name: (~np.isnan(time_s)).astype(float)
+            for name, time_s in zip(_EVENTS, (lost_s, collision_s), strict=True)
         }
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
         """Return what happens without manoeuvres."""
-        return self.losses(group, steered=False)
+        return self.nominal(group)
 
 
 class SeverityParameters(TargetParameters, SizeParameters):

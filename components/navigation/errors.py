@@ -23,11 +23,14 @@ from components.arguments.checks import (
     unflatten,
 )
 from components.geometry import (
+    NEAR_A_POLE_DEG,
     POSE_FIELDS,
     body_angles,
     body_to_ned,
+    level_parts,
     ned_to_body,
     radii_of_curvature,
+    turn_of_north_rad,
     unit_vector,
     wrap_two_pi,
 )
@@ -180,7 +183,6 @@ class NavigationErrors(_Navigation[Believing]):
     """What the ownship believes of its position and attitude: biases, and noise that lasts."""
 
     acts_on = OWNSHIP
-    lockstep = True
 
     def build(self, block: Any) -> Believing:
         """Return what gives the belief at each instant.
@@ -208,18 +210,27 @@ class NavigationErrors(_Navigation[Believing]):
             instant = nanosecond_of(states.tick, block.context.ticks_per_s)
             high = (instant >> _SCAN_BITS).astype(np.uint64)
             low = instant & ((1 << _SCAN_BITS) - 1)
-            drawn = stream.of_runs(states.run)
-            errors = []
+            drawn = stream.of_runs(states.run, instant)
+            normals: list[FloatArray] = []
             for number in range(6):
                 process = lasting[number // 3]
                 if process is None:
-                    normal = drawn.normal(high, low, number)
+                    normals.append(drawn.normal(high, low, number))
                 else:
-                    normal = process(_OWNSHIP, instant, number % 3, states.run)
-                errors.append(bias[number] + noise[number] * normal)
-            position = displaced_position(
-                states.own_lat_deg, states.own_lon_deg, states.own_alt_m, *errors[:3]
-            )
+                    normals.append(process(_OWNSHIP, instant, number % 3, states.run))
+            if lasting[0] is not None:
+                # Fixed to the Earth: near a pole, where north turns about, the error does not.
+                outward = lasting[0](_OWNSHIP, instant, 3, states.run)
+                normals[:2] = level_parts(
+                    normals[0], normals[1], outward, states.own_lat_deg, states.own_lon_deg
+                )
+            errors = [bias[k] + noise[k] * normal for k, normal in enumerate(normals)]
+            true = states.own_lat_deg, states.own_lon_deg
+            position = displaced_position(*true, states.own_alt_m, *errors[:3])
+            # How it is turned it knows from where it believes north to be.
+            near = np.abs(true[0]) > NEAR_A_POLE_DEG
+            turned = np.where(near, turn_of_north_rad(true, position[:2]), 0.0)
+            errors[3] = errors[3] + turned
             attitude = states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad
             return dict(
                 zip(POSE_FIELDS, (*position, *map(_off, attitude, errors[3:])), strict=True)
@@ -232,7 +243,6 @@ class NavigationReport(_Navigation[Reporting]):
     """The line of sight of every detection in the horizon's axes, as the ownship believes them."""
 
     acts_on = REPORT
-    lockstep = True
 
     def build(self, block: Any) -> Reporting:
         """Return what adds the columns to a report, and to its variances what navigation knows."""

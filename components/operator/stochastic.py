@@ -17,11 +17,12 @@ from components.flights.point_mass import LEAST_EASING_S
 from components.guidance.daidalus import ConfParameters, changes_out, why_never_steers
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
 from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.time.clock import nanosecond_of
 
 #: Shape of the time that coordination with air traffic control takes, a gamma distribution.
 COORDINATION_SHAPE = 5.5
@@ -242,6 +243,8 @@ class Stochastic(Component):
         )
         #: By run.
         self._minds: dict[int, Mind] = {}
+        #: From which tick on each has something to do while an alert lasts; infinity without one.
+        self._next: FloatArray = np.empty(0)
         #: How often nothing led out, of how often it was to steer, by run.
         self._stuck = NO_COUNTS
 
@@ -261,22 +264,39 @@ class Stochastic(Component):
         if alerts is None:
             return None
         highest, runs = alerts.highest(), wake.run
-        # Without an alert, now or before, there is nothing to do.
-        alerted = highest >= self.p.level
-        busy = [run for run, mind in self._minds.items() if mind.since is not None]
-        followed = np.isin(runs, np.union1d(runs[alerted], np.array(busy, dtype=np.int64)))
         choosing: list[tuple[int, Mind]] = []
         acting: list[tuple[int, int]] = []
-        for index in np.flatnonzero(followed).tolist():
+        for index in np.flatnonzero(self._has_to_do(wake, highest)).tolist():
             run = int(runs[index])
             mind = self._minds.get(run, Mind(run))
             mind, chooses, acts = self._followed(mind, int(wake.ticks[index]), int(highest[index]))
-            self._minds[run] = mind
+            self._minds[run], self._next[run] = mind, self._next_tick(mind)
             if chooses:
                 choosing.append((index, mind))
             if acts:
                 acting.append((index, run))
         return Manoeuvres.at_rows(wake.instants, self._sent(alerts, choosing, acting))
+
+    def _has_to_do(self, wake: Wake, highest: IntArray) -> BoolArray:
+        """Tell at which rows something may change: nothing does without an alert, now or before,
+        nor while one lasts and a decision waits.
+        """
+        missing = int(wake.run.max(initial=-1)) + 1 - len(self._next)
+        self._next = np.concatenate([self._next, np.full(max(0, missing), np.inf)])
+        alerted, due = highest >= self.p.level, self._next[wake.run]
+        has_alert = due < np.inf
+        if len(wake.instants.last_of_each) < len(wake):  # who is followed at one row is so later
+            return np.isin(wake.run, wake.run[alerted | has_alert])
+        return (alerted != has_alert) | (alerted & (wake.ticks >= due))
+
+    def _next_tick(self, mind: Mind) -> float:
+        """Return a tick before which an alert that goes on changes nothing; never without one."""
+        if mind.since is None:
+            return math.inf
+        if mind.acts_at is None:
+            held = mind.since + self.p.held_s * self.context.ticks_per_s
+            return math.floor(max(held, mind.free_from))
+        return math.floor(mind.acts_at if mind.chooses_at is None else mind.chooses_at)
 
     def _sent(
         self,
@@ -313,7 +333,7 @@ class Stochastic(Component):
         free = tick > mind.free_from if early and mind.has_acted else tick >= mind.free_from
         if mind.acts_at is None and held and free:
             mind = mind._replace(decisions=mind.decisions + 1)
-            waits_s, executes_s = self._response_s(mind, highest)
+            waits_s, executes_s = self._response_s(mind, highest, tick)
             acts_at = tick + (waits_s + executes_s) * per_s
             mind = mind._replace(
                 chooses_at=tick + waits_s * per_s if early else acts_at, acts_at=acts_at
@@ -322,18 +342,19 @@ class Stochastic(Component):
         if chooses:
             wait_s = mean_pause_s(highest)
             if not self.p.deterministic:
-                wait_s = pause_s(highest, self._draw(mind, self._pause, 0))
+                wait_s = pause_s(highest, self._draw(mind, self._pause, 0, tick))
             mind = mind._replace(chooses_at=None, free_from=tick + wait_s * per_s)
         if mind.chooses_at is not None or mind.acts_at is None or tick < mind.acts_at:
             return mind, chooses, False
         return mind._replace(acts_at=None, has_acted=True), chooses, True
 
-    def _draw(self, mind: Mind, stream: Any, number: int) -> float:
-        """Return the draw of a number, of the latest decision."""
-        drawn = stream.of_runs(np.int64(mind.run))
+    def _draw(self, mind: Mind, stream: Any, number: int, tick: int) -> float:
+        """Return the draw of a number, of the latest decision, made at a tick."""
+        instant_ns = nanosecond_of(np.array(tick, dtype=np.int64), self.context.ticks_per_s)
+        drawn = stream.of_runs(np.int64(mind.run), instant_ns)
         return float(drawn.uniform(np.uint64(0), np.int64(mind.decisions), number))
 
-    def _response_s(self, mind: Mind, highest: int) -> tuple[float, float]:
+    def _response_s(self, mind: Mind, highest: int, tick: int) -> tuple[float, float]:
         initial_s, coordination_s = self.p.initial_delay_s, self.p.coordination_s
         if mind.has_acted:
             initial_s = coordination_s = 0.0
@@ -341,7 +362,7 @@ class Stochastic(Component):
             coordination_s = 0.0
         draws = None
         if not self.p.deterministic:
-            draws = np.array([self._draw(mind, self._response, k) for k in range(3)])
+            draws = np.array([self._draw(mind, self._response, k, tick) for k in range(3)])
         return response_s(draws, initial_s, coordination_s, self.p.execution_delay_s)
 
     def _manoeuvres_at(
@@ -353,8 +374,10 @@ class Stochastic(Component):
         for index, mind in acting:
             by_turn[index], draws[index] = self.p.turn_share >= 0.5, None
             if not self.p.deterministic:
-                by_turn[index] = self._draw(mind, self._steering, 0) < self.p.turn_share
-                draws[index] = Draws(*(self._draw(mind, self._steering, k) for k in (1, 2, 3)))
+                tick = int(alerts.tick[index])
+                drawn = [self._draw(mind, self._steering, k, tick) for k in range(4)]
+                by_turn[index] = drawn[0] < self.p.turn_share
+                draws[index] = Draws(*drawn[1:])
         result: dict[int, Manoeuvre] = {}
         needed: set[int] = set()
         # Who finds no way out by one kind tries the other.

@@ -318,7 +318,8 @@ class Camera(Sensor):
             signal = {"pixels": pixels, "contrast": contrast}
             return Look(margin >= 0.0, margin, {"pixels": pixels}, signal)
         keys = cells.roster.keys_of(cells.target)
-        sample = signature + noise * self._noise.of_runs(cells.run).normal(keys, cells.scan)
+        drawn = self._noise.of_runs(cells.run, cells.instant_ns).normal(keys, cells.scan)
+        sample = signature + noise * drawn
         margin = sample - threshold
         seen = (margin >= 0.0) & (signature > threshold - FAINTEST_DEVIATIONS * noise)
         extras = {"pixels": pixels}

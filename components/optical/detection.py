@@ -28,6 +28,7 @@ from components.messages.false_detections import add_false_detections, in_measur
 from components.radar.detection.output import false_alarm_count
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
+from dsa_des.time.clock import nanosecond_of
 
 _NORMAL = NormalDist()
 _PIXEL_VARIANCE = 1.0 / 12.0
@@ -183,8 +184,10 @@ class AddedFalseAlarms:
     def _with_alarms(self, detections: Detections, marked: bool) -> Detections:
         block, reach = self._block, self._block.reach
         found = block.detector
+        now_ns = nanosecond_of(detections.tick, block.context.ticks_per_s)
+        every = self._draws.of_runs(detections.run, now_ns)
         count = false_alarm_count(
-            self._draws.of_runs(detections.run).uniform(_NO_TARGET, detections.scan, _HOW_MANY),
+            every.uniform(_NO_TARGET, detections.scan, _HOW_MANY),
             cells=found.places,
             false_alarm_probability=found.false_alarms / found.places,
         )
@@ -193,7 +196,7 @@ class AddedFalseAlarms:
             return detections
         first = np.repeat(np.cumsum(count) - count, count)
         number = (np.arange(len(row)) - first).astype(np.uint64)
-        scan, drawn = detections.scan[row], self._draws.of_runs(detections.run[row])
+        scan, drawn = detections.scan[row], self._draws.of_runs(detections.run[row], now_ns[row])
         azimuth_draw, elevation_draw, strength, contrast = (
             drawn.uniform(number, scan, draw)
             for draw in (_AZIMUTH, _ELEVATION, _STRENGTH, _CONTRAST)
@@ -228,7 +231,6 @@ class AddedFalseAlarms:
 class FrameFalseAlarms(Effect[Reporting]):
     """Noise that reaches the threshold, anywhere in the picture: Binomial(places, Pfa) a frame."""
 
-    lockstep = True
     name = "false alarms"
     acts_on = REPORT
     builds = AddedFalseAlarms

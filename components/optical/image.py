@@ -143,7 +143,6 @@ class ImageCamera(ElectroOptical):
     """
 
     Parameters = ImageParameters
-    lockstep = True
     ladders = (_LADDER,)
     _message = PictureDetections
 
@@ -317,7 +316,8 @@ class ImageCamera(ElectroOptical):
         number = np.arange(side * side, dtype=np.uint64) * _APART
         scans = np.full(side * side, scene.cells.scan[scene.cell])
         run = np.full(side * side, scene.cells.run[scene.cell])
-        drawn = self._pixels.of_runs(run).normal(scene.key ^ number, scans, which)
+        now_ns = scene.cells.instant_ns[scene.cell]
+        drawn = self._pixels.of_runs(run, now_ns).normal(scene.key ^ number, scans, which)
         noise = drawn.reshape(side, side)
         return np.asarray(picture + (self.pixel_noise / scene.binned) * noise)
 

@@ -21,6 +21,7 @@ from components.radar.resolution import cell_size, cells_of_radar
 from components.sensor.cued_looks import CUE
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
+from dsa_des.time.clock import nanosecond_of
 
 MOST_PER_SCAN = 1e5
 
@@ -77,8 +78,10 @@ class NoiseReports:
         crossing: Crossing,
         which: int,
     ) -> Detections:
+        now_ns = nanosecond_of(detections.tick, self._block.context.ticks_per_s)
+        counts = self._counts.of_runs(detections.run, now_ns)
         count = false_alarm_count(
-            self._counts.of_runs(detections.run).uniform(_NO_TARGET, detections.scan, which),
+            counts.uniform(_NO_TARGET, detections.scan, which),
             cells=self._cells.count,
             false_alarm_probability=crossing.false_alarm_probability,
         )
@@ -88,7 +91,7 @@ class NoiseReports:
         # Keyed by its number within the scan, where detections are keyed by target.
         number = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
         key = (number + which * _OF_CUED).astype(np.uint64)
-        scan, places = detections.scan[row], self._places.of_runs(detections.run[row])
+        scan, places = detections.scan[row], self._places.of_runs(detections.run[row], now_ns[row])
         across, upwards, outwards, power = (places.uniform(key, scan, draw) for draw in range(4))
         where = {
             "azimuth": _between(across, self._cells.azimuth_rad),
@@ -120,7 +123,6 @@ class FalseAlarms(Effect[Reporting]):
     ``detection_probability`` is null for all (``looks`` has it).
     """
 
-    lockstep = True
     name = "false alarms"
     acts_on = REPORT
     builds = NoiseReports
@@ -311,7 +313,6 @@ class ClutterAlarms(Effect[Reporting]):
     sidelobes meet cross it in every cell.
     """
 
-    lockstep = True
     name = "clutter false alarms"
     acts_on = REPORT
     builds = GroundReports

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.arguments.checks import not_negative, positive
+from components.geometry import NEAR_A_POLE_DEG, turned_by_meridians
 from components.messages.columns import OWN_VELOCITY
 from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.targets import RelativeTargets, own_velocity
@@ -160,7 +161,7 @@ class Strength:
         extras = {name: v for name, v in look.extras.items() if name != "detection_probability"}
         if look.tail is None:
             keys = cells.roster.keys_of(cells.target[detected])
-            draws = self._draws.of_runs(cells.run[detected])
+            draws = self._draws.of_runs(cells.run[detected], cells.instant_ns[detected])
             tail = 1.0 - draws.uniform(keys, cells.scan[detected])
         else:
             tail = look.tail[detected]
@@ -205,7 +206,6 @@ class MeasuredStrength(Effect[Strengthening]):
     decided. Where the draw of a look decides, the same draw says how strong it came out.
     """
 
-    lockstep = True
     name = "measured strength"
     acts_on = STRENGTH
     builds = Strength
@@ -243,7 +243,6 @@ class OwnVelocity(Effect[Reporting]):
     A range rate is of two aircraft: an estimate of the other one's velocity from it needs ours.
     """
 
-    lockstep = True
     name = "own velocity"
     acts_on = REPORT
     flag = "measures_range_rate"
@@ -262,7 +261,9 @@ class OwnVelocity(Effect[Reporting]):
             row = rows[some] if after is None else np.repeat(rows, counts)
             state = targets.picture_tick[row]
             time_s = (state if after is None else state + after) / ticks_per_s
-            velocity = own_velocity(targets, row, time_s)
+            velocity = _from_believed_north(
+                own_velocity(targets, row, time_s), targets, row, time_s
+            )
             if after is not None:
                 own = dict(zip(OWN_VELOCITY, velocity, strict=True))
                 return replace(detections, own_velocity_of_entries=own)
@@ -271,3 +272,17 @@ class OwnVelocity(Effect[Reporting]):
             return replace(detections, own_velocity=dict(zip(OWN_VELOCITY, of_scans, strict=True)))
 
         return with_velocity
+
+
+def _from_believed_north(
+    velocity: FloatArray, targets: RelativeTargets, row: IntArray, time_s: FloatArray
+) -> FloatArray:
+    """Return the ownship's velocity along north and east of where it believes to be."""
+    believed, flights = targets.believed, targets.revisit
+    if believed is None or flights is None or not len(row):
+        return velocity
+    place = believed["lat_deg"][row], believed["lon_deg"][row]
+    if not (np.abs(place[0]) > NEAR_A_POLE_DEG).any():
+        return velocity
+    own = flights.own_at(row, time_s)
+    return turned_by_meridians(velocity, (own.lat_deg, own.lon_deg), place)

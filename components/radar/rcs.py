@@ -133,7 +133,6 @@ def _by_targets(context: Context, says: Callable[[Aircraft], str], *, otherwise:
 class RcsFluctuation(Effect[ModelsOfCells]):
     """Swerling fluctuation I to IV (thesis §4.1.2); without it every target is steady."""
 
-    lockstep = True
     name = "RCS fluctuation"
     acts_on = FLUCTUATION
 
@@ -152,35 +151,9 @@ class RcsFluctuation(Effect[ModelsOfCells]):
         return models_of(block.p.swerling)
 
 
-# An aircraft of this extent that flies straight keeps its aspect within so much in a second.
-_EXTENT_M, _TURNS_RAD_S = 10.0, math.radians(0.2)
-
-
-def fades_drawn_too_often(block: Any) -> list[str]:
-    """Say where each scan has a fade of its own, and comes before the last one can be over."""
-    effects, p = block.context.effects, block.p
-    if not p.enabled or RcsFluctuation.name not in effects or LastingFluctuation.name in effects:
-        return []
-    if p.swerling in (2, 4) and p.pulses is not None and p.pulses > 1:
-        return []
-    # Scatterers that far apart add up otherwise after such a change of aspect (`Scatterers`).
-    lasts_s = 0.5 * block.budget.wavelength / _EXTENT_M / _TURNS_RAD_S
-    if float(p.scan_rate_hz) * lasts_s <= 1.0:
-        return []
-    wavelength_mm = 1e3 * block.budget.wavelength
-    return [
-        f"scan_rate_hz is {float(p.scan_rate_hz):g}, and each scan draws a fade of its own: the "
-        f"echo of an aircraft of {_EXTENT_M:g} m that flies straight fades for some "
-        f"{lasts_s:.2g} s or more at {wavelength_mm:.3g} mm, so that m of n count one fade as "
-        "several, and targets are declared sooner than they would be; fluctuation_correlation_s or "
-        "scintillation_extent_m lets fades last"
-    ]
-
-
 class AspectRcs(Effect[CellValues]):
     """Mean RCS from a table over the direction from which the radar sees the aircraft."""
 
-    lockstep = True
     name = "aspect RCS"
     acts_on = MEAN_RCS
 
@@ -340,7 +313,6 @@ class LastingFluctuation(Effect[Fading]):
     An aspect table's mean is multiplied by it.
     """
 
-    lockstep = True
     name = "lasting fluctuation"
     acts_on = FADING
     outside_the_proof = "without it every scan draws a fade of its own"

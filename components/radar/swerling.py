@@ -21,7 +21,6 @@ from components.radar.rcs import (
     LastingFluctuation,
     ModelsOfCells,
     RcsFluctuation,
-    fades_drawn_too_often,
     models_of,
     scan_rcs,
     steady,
@@ -158,7 +157,6 @@ class SwerlingRadar(LinkBudgetRadar):
     """
 
     Parameters = SwerlingParameters
-    lockstep = True
     hooks = (FLUCTUATION, FADING, PD_METHOD)
     effects = (RcsFluctuation(), LastingFluctuation(), ExactDetection(), *LinkBudgetRadar.effects)
 
@@ -187,7 +185,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def warnings(self) -> list[str]:
         """Say besides where scans come faster than fades end."""
-        return [*super().warnings(), *fades_drawn_too_often(self)]
+        return [*super().warnings(), *_fades_drawn_too_often(self)]
 
     def range_slack(self) -> float:
         """Return the relative error of range whose change of Pd ``[accuracy]`` still allows.
@@ -247,7 +245,7 @@ class SwerlingRadar(LinkBudgetRadar):
             if self._fading is not None and self._lasts(model):
                 rcs[chosen] = rcs[chosen] * self._fading(cells, chosen, model)
                 continue
-            draws = self._rcs_draws.of_runs(cells.run[chosen])
+            draws = self._rcs_draws.of_runs(cells.run[chosen], cells.instant_ns[chosen])
             draw = partial(draws.uniform, keys[chosen], cells.scan[chosen])
             rcs[chosen] = scan_rcs(
                 rcs[chosen], draw, pulses=self.p.pulses_summed, model=f"swerling{model}"
@@ -369,3 +367,28 @@ def _steepest_pd(pulses: int, false_alarm_probability: float) -> float:
         steepest = max(steepest, float(np.max(np.diff(pd) / np.diff(log_snr))))
     # Secants over 0.001 in ln SNR miss the steepest tangent by far less than this margin.
     return 1.01 * steepest
+
+
+# An aircraft of this extent that flies straight keeps its aspect within so much in a second.
+_EXTENT_M, _TURNS_RAD_S = 10.0, math.radians(0.2)
+
+
+def _fades_drawn_too_often(block: Any) -> list[str]:
+    """Say where each scan has a fade of its own, and comes before the last one can be over."""
+    effects, p = block.context.effects, block.p
+    if not p.enabled or RcsFluctuation.name not in effects or LastingFluctuation.name in effects:
+        return []
+    if p.swerling in (2, 4) and p.pulses is not None and p.pulses > 1:
+        return []
+    # Scatterers that far apart add up otherwise after such a change of aspect (`Scatterers`).
+    lasts_s = 0.5 * block.budget.wavelength / _EXTENT_M / _TURNS_RAD_S
+    if float(p.scan_rate_hz) * lasts_s <= 1.0:
+        return []
+    wavelength_mm = 1e3 * block.budget.wavelength
+    return [
+        f"scan_rate_hz is {float(p.scan_rate_hz):g}, and each scan draws a fade of its own: the "
+        f"echo of an aircraft of {_EXTENT_M:g} m that flies straight fades for some "
+        f"{lasts_s:.2g} s or more at {wavelength_mm:.3g} mm, so that m of n count one fade as "
+        "several, and targets are declared sooner than they would be; fluctuation_correlation_s or "
+        "scintillation_extent_m lets fades last"
+    ]

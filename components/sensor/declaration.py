@@ -5,7 +5,9 @@ Looks before the first one count as misses.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -57,7 +59,6 @@ class DeclarationRule(Effect[Judging]):
 
     name = "declaration"
     acts_on = DECLARATION
-    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``declare_m`` and ``declare_n``."""
@@ -127,6 +128,9 @@ class Declarations:
 GATE_DEVIATIONS = 3.0
 # Pairs that are compared at a time: some 100 MB of intermediate arrays.
 _MOST_PAIRS = 2_000_000
+# Of more pairs those are left out first whose directions are too far apart. In the tree of
+# all directions, scans are farther apart than any two directions.
+_FEW_PAIRS, _SCANS_APART = 10_000, 10.0
 
 
 @dataclass(frozen=True)
@@ -171,20 +175,66 @@ def scans_with_company(
     count = np.ones(len(asked), dtype=np.int64)
     if len(places) == 0:
         return count
+    neighbours: _Neighbours | None = None
     for lag in range(1, n):
         scans, wanted = RunTicks(places.run, places.scan), places.scan[asked] - lag
         first = next_of_run(scans, RunTicks(places.run[asked], wanted))
         number = next_of_run(scans, RunTicks(places.run[asked], wanted + 1)) - first
-        start, most = 0, max(1, _MOST_PAIRS // max(1, int(number.max(initial=1))))
-        while start < len(asked):
-            part = slice(start, start + most)
-            start += most
-            here = np.repeat(np.arange(len(asked))[part], number[part])
-            start_of = np.cumsum(number[part]) - number[part]
-            there = np.arange(len(here)) + np.repeat(first[part] - start_of, number[part])
+        pairs = _every_pair(first, number)
+        if int(number.sum()) > _FEW_PAIRS:
+            neighbours = neighbours or _Neighbours(places, rate_rad_s)
+            pairs = neighbours.pairs(asked, first, number)
+        for here, there in pairs:
             near = _near(places, asked[here], there, speed_m_s, rate_rad_s)
             count += np.bincount(here[near], minlength=len(asked)) > 0
     return count
+
+
+def _every_pair(first: IntArray, number: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
+    """Give each asked one's index with those of a scan: so many entries from its first on."""
+    start, most = 0, max(1, _MOST_PAIRS // max(1, int(number.max(initial=1))))
+    while start < len(first):
+        part = slice(start, start + most)
+        here = np.repeat(np.arange(len(first))[part], number[part])
+        start_of = np.cumsum(number[part]) - number[part]
+        yield here, np.arange(len(here)) + np.repeat(first[part] - start_of, number[part])
+        start += most
+
+
+class _Neighbours:
+    """Finds entries of a scan whose directions may be near: all that are, and few others."""
+
+    def __init__(self, places: SeenPlaces, rate_rad_s: float) -> None:
+        from scipy.spatial import cKDTree
+
+        new = (np.diff(places.run) != 0) | (np.diff(places.scan) != 0)
+        self._scan = np.concatenate([[0], np.cumsum(new)])
+        self._places, self._rate_rad_s = places, rate_rad_s
+        begins = np.concatenate([[0], np.flatnonzero(new) + 1])
+        #: Of each scan, the first and the last instant at which anything was measured.
+        self._ends_s = [f.reduceat(places.time_s, begins) for f in (np.minimum, np.maximum)]
+        self._variance = np.nan_to_num(places.angle_variance_rad2)
+        self._tree = cKDTree(np.column_stack([places.direction, _SCANS_APART * self._scan]))
+
+    def pairs(
+        self, asked: IntArray, first: IntArray, number: IntArray
+    ) -> Iterator[tuple[IntArray, IntArray]]:
+        """Give indices of those asked, and entries of the scan that begins at each one's first."""
+        some = np.flatnonzero(number)
+        mine, scan = asked[some], self._scan[first[some]]
+        time_s = self._places.time_s[mine]
+        apart_s = np.max([np.abs(time_s - end_s[scan]) for end_s in self._ends_s], axis=0)
+        gate_rad = self._rate_rad_s * apart_s
+        gate_rad += GATE_DEVIATIONS * np.sqrt(self._variance[mine] + self._variance.max())
+        # The chord of the widest gate, and a rounding more.
+        radius = 2.0 * np.sin(np.minimum(0.5 * gate_rad, 0.5 * np.pi)) * (1.0 + 1e-9) + 1e-12
+        points = np.column_stack([self._places.direction[mine], _SCANS_APART * scan])
+        counts = self._tree.query_ball_point(points, radius, return_length=True)
+        batch = np.cumsum(counts) // _MOST_PAIRS
+        for rows in np.split(np.arange(len(some)), np.flatnonzero(np.diff(batch)) + 1):
+            found = self._tree.query_ball_point(points[rows], radius[rows], return_sorted=True)
+            there = np.fromiter(chain.from_iterable(found), np.int64, int(counts[rows].sum()))
+            yield np.repeat(some[rows], counts[rows]), there
 
 
 def _near(
@@ -287,7 +337,6 @@ class DeclarationByPlace(Effect[Reporting]):
     name = "declaration by place"
     acts_on = REPORT
     builds = DeclaredPlaces
-    lockstep = True
     outside_the_proof = "without it whatever is reported is declared"
 
     def verdict(self, block: Any) -> Verdict:

@@ -217,7 +217,7 @@ class Cells:
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
         """Return uniform draws keyed by each cell's target and scan."""
         keys = self.roster.keys_of(self.target)
-        return stream.of_runs(self.run).uniform(keys, self.scan, draw)
+        return stream.of_runs(self.run, self.instant_ns).uniform(keys, self.scan, draw)
 
 
 def turned_to_sight(

@@ -56,7 +56,7 @@ class QuantityError:
     ) -> FloatArray:
         """Return the errors of looks; `variance` is of what the signal adds at each."""
         error = self._bias_of(run) if self._bias else np.zeros(len(scan))
-        looks = self._looks.of_runs(run)
+        looks = self._looks.of_runs(run, instant_ns)
         if self._lasting is not None:
             error = error + self._deviation * self._lasting(keys, instant_ns, run=run)
         elif self._deviation:
@@ -110,9 +110,10 @@ class ErrorModel:
         signal = {name: all_[detected] for name, all_ in look.signal.items()}
         keys = cells.roster.keys_of(cells.target[detected])
         scan, run = cells.scan[detected], cells.run[detected]
+        instant_ns = cells.instant_ns[detected]
         if look.noise is not None and self._signal:
-            true = self._in_cells(true, look.noise[detected], keys, scan, run)
-        return self.of_noise(true, signal, (keys, scan, cells.instant_ns[detected], run))
+            true = self._in_cells(true, look.noise[detected], keys, scan, run, instant_ns)
+        return self.of_noise(true, signal, (keys, scan, instant_ns, run))
 
     def _in_cells(
         self,
@@ -121,6 +122,7 @@ class ErrorModel:
         keys: AnyArray,
         scan: IntArray,
         run: IntArray,
+        instant_ns: IntArray,
     ) -> Values:
         """Put what noise made anywhere in the target's cell, which says no more of the target.
 
@@ -133,7 +135,8 @@ class ErrorModel:
         places = dict(true)
         for number, (name, most) in enumerate(self._block.signal_variances(silent).items()):
             width = math.sqrt(12.0 * float(most[0]))
-            part = self._places.of_runs(run[noise]).uniform(keys[noise], scan[noise], number)
+            drawn = self._places.of_runs(run[noise], instant_ns[noise])
+            part = drawn.uniform(keys[noise], scan[noise], number)
             middle = np.rint(true[name][noise] / width) * width
             low, high = self._fields.get(name, (-math.inf, math.inf))
             first = np.maximum(middle - 0.5 * width, low)
@@ -213,7 +216,6 @@ MEASUREMENT = Hook("measurement", ErrorModel, "what is measured, and its varianc
 class MeasurementErrors(Effect[ErrorModel]):
     """Errors of azimuth, elevation, range and range rate, in the sensor's own axes."""
 
-    lockstep = True
     name = "measurement errors"
     acts_on = MEASUREMENT
     builds = ErrorModel

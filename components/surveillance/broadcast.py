@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from components.aircraft.equipage import Equipage
 from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
+from components.geometry import NEAR_A_POLE_DEG, level_parts, turned_by_meridians
 from components.navigation.errors import displaced_position
 from components.sensor.look import Cells
 from components.surveillance.altimetry import altimetry_error_ft, standard_laplace
@@ -29,8 +30,6 @@ from dsa_des.time.randomness import Streams
 CORRELATION_TIME_S = 300.0
 #: Scale of the Laplace distribution of vertical rates, new with each message (the same source).
 CLIMB_SCALE_M_S = 2.02 * FOOT_M
-#: Nearer to a pole meridians turn by more than a milliradian over an error of 100 m.
-_NEAR_A_POLE_DEG = 89.0
 #: Draws are those of aircraft, not of the block that looks.
 _OWNER = "[equipage]"
 
@@ -48,19 +47,6 @@ class Transponders:
         """Return those of some cells' targets."""
         keys = cells.roster.keys_of(cells.target[which])
         return cls(keys, cells.run[which], cells.craft[which])
-
-
-def turned_by_meridians(
-    north_east_up: FloatArray,
-    here_deg: tuple[FloatArray, FloatArray],
-    there_deg: tuple[FloatArray, FloatArray],
-) -> FloatArray:
-    """Return vectors (3, n) in north and east of a place near by: latitudes and longitudes."""
-    angle = np.radians((there_deg[1] - here_deg[1] + 180.0) % 360.0 - 180.0)
-    angle = angle * np.sin(np.radians(0.5 * (here_deg[0] + there_deg[0])))
-    north, east, up = north_east_up
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return np.stack([cosine * north - sine * east, sine * north + cosine * east, up])
 
 
 class Altimeters:
@@ -131,25 +117,20 @@ class Broadcasts:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the errors north and east of the position or the velocity at instants (n,).
 
-        They last along three axes that are fixed to the Earth, of which north and east at a place
-        are combinations with the same deviation, independent of each other: near a pole, where
-        north turns about, the error does not.
+        They last along three axes that are fixed to the Earth: near a pole, where north turns
+        about, the error does not.
         """
         keys, run = transponders.keys, transponders.run
         if self._errors == "none":
             return np.zeros(len(deviation)), np.zeros(len(deviation))
         if self._errors == "white":
-            stream = self._streams[name].of_runs(run)
+            stream = self._streams[name].of_runs(run, instant_ns)
             draws = [stream.normal(keys, message, axis + 60_000) for axis in range(3)]
         else:
             # What is sent before the run begins is of instants before 0.
             draws = [self._lasting[name](keys, instant_ns, axis, run) for axis in range(3)]
-        # The Earth's axis, east of Greenwich at the equator, and outwards there.
         axis, sideways, outward = draws
-        lat, lon = np.radians(lat_deg), np.radians(lon_deg)
-        east = np.cos(lon) * sideways - np.sin(lon) * outward
-        level = np.cos(lon) * outward + np.sin(lon) * sideways
-        north = np.cos(lat) * axis - np.sin(lat) * level
+        north, east = level_parts(axis, sideways, outward, lat_deg, lon_deg)
         return deviation * north, deviation * east
 
     def _climb_errors(self, transponders: Transponders, message: IntArray) -> FloatArray:
@@ -167,7 +148,7 @@ class Broadcasts:
             "velocity", deviation, *messages, sent.instant_ns, sent.lat_deg, sent.lon_deg
         )
         moved = sent.north_east_up_m_s + np.stack([*level, self._climb_errors(*messages)])
-        near = np.flatnonzero(np.abs(sent.lat_deg) > _NEAR_A_POLE_DEG)
+        near = np.flatnonzero(np.abs(sent.lat_deg) > NEAR_A_POLE_DEG)
         if len(near):
             moved[:, near] = self._in_own_axes(equipage, transponders, sent, near, moved[:, near])
         if not self._quantised:
@@ -222,3 +203,18 @@ class Broadcasts:
         y, x = encode(lat, lon, odd)
         lat, lon = decode_near(y, x, odd, lat, lon)
         return lat, lon, feet * FOOT_M
+
+
+def velocity_in_axes_at(
+    position: list[FloatArray], north_east_down: FloatArray, later_s: FloatArray
+) -> FloatArray:
+    """Return velocities in the axes of positions that are later than they are, (3, n).
+
+    North turns with the meridians, within a mile of a pole by degrees from message to message.
+    """
+    turned = north_east_down
+    for _ in range(3):
+        back = np.nan_to_num(turned * -later_s)
+        lat, lon, _ = displaced_position(*position, *back)
+        turned = turned_by_meridians(north_east_down, (lat, lon), (position[0], position[1]))
+    return turned

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import gzip
+import io
 import math
 import re
+import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -15,6 +19,7 @@ import numpy.typing as npt
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
 from components.geometry import RAD_PER_DEG, past, radii_of_curvature
+from components.terrain.voids import MOST_VOIDS, filled_voids
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
 from dsa_des.files.input_files import InputFileError, read_once, status_of
@@ -48,6 +53,7 @@ class ElevationRaster:
     # (rows, columns): rows from south to north, columns from west to east; finite
     height_m: npt.NDArray[np.floating[Any]]
     name: str = "raster"  # The file, for messages
+    filled: int = 0  # How many nodes had no height in the file, and have one of their rim
 
     def __post_init__(self) -> None:
         rows, columns = self.height_m.shape
@@ -68,8 +74,9 @@ class ElevationRaster:
             raise ValueError(
                 f"{self.name} has {_holes(count)} at latitude "
                 f"{self.south_deg + row * self.lat_step_deg:.6g}, longitude "
-                f"{self.west_deg + column * self.lon_step_deg:.6g}: every node must have a height; "
-                "fill them first"
+                f"{self.west_deg + column * self.lon_step_deg:.6g}: every node must have a height, "
+                f"and up to {MOST_VOIDS:.0%} of a file's nodes are filled from around them; fill "
+                "them first"
             )
 
     @property
@@ -195,6 +202,7 @@ def mosaic(rasters: Sequence[ElevationRaster]) -> ElevationRaster:
         *steps,
         height,
         f"{first.name} and {len(rasters) - 1} more",
+        sum(one.filled for one in rasters),
     )
 
 
@@ -223,15 +231,17 @@ def read_raster(path: Path) -> ElevationRaster:
     path : Path
         ``.hgt``: one degree by one degree, its south-west corner in its name (N45W076.hgt), rows
         from north to south of big-endian 16-bit metres, as many rows as columns, the edges
-        included. ``.tif``, ``.tiff``: GeoTIFF in longitude and latitude, north up.
+        included; also packed (``.hgt.zip``, ``.hgt.gz``). ``.tif``, ``.tiff``: GeoTIFF in
+        longitude and latitude, north up.
 
     Raises
     ------
     ValueError
-        If it cannot be read, is of another kind, has holes, or needs a package that is missing.
+        If it cannot be read, is of another kind, has more holes than are filled, or needs a package
+        that is missing.
     """
     name = shortened(path.name, 80)
-    if path.suffix.lower() == ".hgt":
+    if re.fullmatch(r".*\.hgt(\.zip|\.gz)?", path.name.lower()):
         return _read_hgt(path, name)
     if path.suffix.lower() in _TIFF:
         return _read_geotiff(path, name)
@@ -244,20 +254,48 @@ def _read_hgt(path: Path, name: str) -> ElevationRaster:
         raise ValueError(
             f"{name}: the name of an .hgt file must say its south-west corner, as N45W076.hgt does"
         )
-    nodes = math.isqrt(path.stat().st_size // 2)
+    data = _unpacked(path, name)
+    nodes = math.isqrt(len(data) // 2)
     refuse_many_nodes(name, nodes, nodes)
-    data = path.read_bytes()
     if nodes < 2 or 2 * nodes * nodes != len(data):
         raise ValueError(
             f"{name} has {len(data):,} bytes: an .hgt file holds as many rows as columns of two "
             "bytes each (1201 or 3601 of them in SRTM)"
         )
     rows = np.frombuffer(data, dtype=">i2").reshape(nodes, nodes)[::-1]
-    height = np.where(rows == _VOID, np.nan, rows).astype(np.float32)
+    height, filled = filled_voids(np.where(rows == _VOID, np.nan, rows).astype(np.float32))
     south = int(match[2]) * (1.0 if match[1].upper() == "N" else -1.0)
     west = int(match[4]) * (1.0 if match[3].upper() == "E" else -1.0)
     step = 1.0 / (nodes - 1)
-    return ElevationRaster(south, west, step, step, height, name)
+    return ElevationRaster(south, west, step, step, height, name, filled)
+
+
+def _unpacked(path: Path, name: str) -> bytes:
+    """Return the content of a file, or of the one .hgt in an archive."""
+    refuse_many_nodes(name, 1, path.stat().st_size // 2)
+    data = path.read_bytes()
+    most = 2 * MOST_NODES + 1
+    try:
+        if data.startswith(b"\x1f\x8b"):
+            with gzip.open(io.BytesIO(data)) as file:
+                return file.read(most)
+        if data.startswith(b"PK\x03\x04"):
+            with zipfile.ZipFile(io.BytesIO(data)) as archive:
+                inside = [one for one in archive.namelist() if one.lower().endswith(".hgt")]
+                if len(inside) != 1:
+                    raise ValueError(f"{name} holds {len(inside)} .hgt files: one is needed")
+                with archive.open(inside[0]) as file:
+                    return file.read(most)
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        OSError,
+        NotImplementedError,
+        RuntimeError,
+    ) as e:
+        raise ValueError(f"{name} is a damaged archive: {e}") from None
+    return data
 
 
 def _read_geotiff(path: Path, name: str) -> ElevationRaster:
@@ -283,11 +321,11 @@ def _read_geotiff(path: Path, name: str) -> ElevationRaster:
         )
     if transform.b or transform.d or transform.a <= 0.0 or transform.e >= 0.0:
         raise ValueError(f"{name} is turned or upside down: its rows must run from north to south")
-    height = np.ma.filled(band.astype(np.float32), np.nan)[::-1]
+    height, filled = filled_voids(np.ma.filled(band.astype(np.float32), np.nan)[::-1])
     # The transform gives the corners of pixels; heights are those of their middles.
     west = transform.c + 0.5 * transform.a
     south = transform.f + (height.shape[0] - 0.5) * transform.e
-    return ElevationRaster(south, west, transform.a, -transform.e, np.array(height), name)
+    return ElevationRaster(south, west, transform.a, -transform.e, np.array(height), name, filled)
 
 
 #: Runs of a study that name the same file share one raster.

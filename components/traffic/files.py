@@ -167,7 +167,7 @@ class FileTraffic(RecordedTraffic):
 
     def read(self) -> TrafficFile:
         """Return what is taken of the files."""
-        return _read(self.p.paths(), self.p.choice())
+        return traffic_of(self.p)
 
     def own_flight(self) -> Trajectory:
         """Return the ownship's flight, recorded or scripted."""
@@ -200,6 +200,12 @@ class DaaFile(RecordedTraffic):
         """Return the content of the file."""
         p = self.p
         return _read_daa(p.file, p.reference_lat_deg, p.reference_lon_deg, p.reference_alt_m)
+
+
+def traffic_of(parameters: FileTrafficParameters) -> TrafficFile:
+    """Return what is taken of files."""
+    content: TrafficFile = _read(parameters.paths(), parameters.choice())
+    return content
 
 
 #: Earlier names of what reads files of any kind.

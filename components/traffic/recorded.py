@@ -16,10 +16,11 @@ from components.flights.fleet import Trajectory
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.formats.text_rows import TrafficFile
 from components.geometry import line_of_sight_ned
-from components.traffic.source import SourceParameters, TrafficSource, roster_of
+from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
+from dsa_des.errors import did_you_mean
 
 #: Beyond any aircraft: m/s along the path and upward, m/s², and metres above the ellipsoid.
 FASTEST_MPS, CLIMB_MPS, ACCELERATION_MPS2, HIGHEST_M = 1000.0, 200.0, 150.0, 25_000.0
@@ -240,3 +241,14 @@ class RecordedTraffic(TrafficSource):
         if derived := derived_attitude(self.content):
             source["derived_attitude"] = derived
         return {**super().report(), "traffic": source}
+
+
+def roster_of(
+    names: Sequence[str], default: Aircraft, others: dict[str, Aircraft], what: str
+) -> Roster:
+    """Return the roster of named targets: `others` by name, `default` for the rest."""
+    for name in others:
+        if name not in names:
+            raise ValueError(f"aircraft.{name}: {what} has no such intruder"
+                             f"{did_you_mean(name, names)}")  # fmt: skip
+    return Roster.of([(name, others.get(name, default)) for name in names])

@@ -53,7 +53,6 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Context, Input, Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
-from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
 
 
@@ -359,18 +358,14 @@ class TrafficSource(Component):
         best = self._closest_approaches(end_s)
         where = censored_approaches(self, self._compared_at(end_s), best.time_s, end_s)
         closest = zip(names, best.time_s.tolist(), best.range_m.tolist(), where, strict=True)
+        approaches = {
+            name: {"time_s": time_s, "range_m": range_m, **({"at": at} if at else {})}
+            for name, time_s, range_m, at in closest
+        }
         return {
             "targets": {
-                name: {
-                    "closest_approach": {
-                        "time_s": time_s,
-                        "range_m": range_m,
-                        **({"at": at} if at else {}),
-                    }
-                    if math.isfinite(range_m)
-                    else None
-                }
-                for name, time_s, range_m, at in closest
+                name: {"closest_approach": one if math.isfinite(one["range_m"]) else None}
+                for name, one in approaches.items()
             }
         }
 
@@ -402,14 +397,3 @@ class TrafficSource(Component):
 def _one_of(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
     """Return the states of one flight of many at times (n,)."""
     return fleet.each(np.full(len(time_s), aircraft), time_s)
-
-
-def roster_of(
-    names: Sequence[str], default: Aircraft, others: dict[str, Aircraft], what: str
-) -> Roster:
-    """Return the roster of named targets: `others` by name, `default` for the rest."""
-    for name in others:
-        if name not in names:
-            raise ValueError(f"aircraft.{name}: {what} has no such intruder"
-                             f"{did_you_mean(name, names)}")  # fmt: skip
-    return Roster.of([(name, others.get(name, default)) for name in names])

@@ -206,7 +206,6 @@ class Lookout(Sensor):
 
     mark = EYES
     Parameters = LookoutParameters
-    lockstep = True
     hooks = (DARKNESS,)
     effects: ClassVar[tuple[Effect, ...]] = (Night(),)
     ladders = (BETWEEN_SCANS,)
@@ -294,7 +293,8 @@ class Lookout(Sensor):
         if self.p.search == "random":
             expected = self._expected(cells, which)
             keys = cells.roster.keys_of(cells.target[which])
-            drawn = self._finds.of_runs(cells.run[which]).uniform(keys, cells.scan[which])
+            finds = self._finds.of_runs(cells.run[which], cells.instant_ns[which])
+            drawn = finds.uniform(keys, cells.scan[which])
             return np.asarray(drawn < -np.expm1(-expected))
         result = np.zeros(len(which), dtype=bool)
         for seat in self._seats:

@@ -66,7 +66,7 @@ def page() -> str:
     for table, columns in sorted(kinds.items()):
         rows_of = [(name, column.kind, *column[:3]) for name, column in columns.items()]
         parts += [f"### {table}\n", _table(heads, rows_of)]
-    parts += ["## Traffic files\n", "### CSV (`traffic.csv`)\n"]
+    parts += ["## Traffic files\n", "### Tables (`traffic.file`)\n"]
     names = ("quantity", "accepted names")
     unit = "unit unless the header says another"
     parts.append(_table((*names, unit, "needed"), csv_columns()))
@@ -74,9 +74,7 @@ def page() -> str:
         "`position` holds latitude and longitude in one cell, `date` the day of a clock. Columns "
         "of readsb, FlightRadar24 and BaseStation are in ft, kt and ft/min unless the header says "
         "another. Rows without a time or a position are left out, a velocity or attitude with gaps "
-        "is not used; `check` says so. The file may be a log as well: `aircraft.json` (one, or "
-        "one in each line) or a trace of readsb, SBS-1 lines, OpenSky's states in JSON. Any may be "
-        "packed (`.gz`).\n"
+        "is not used; `check` says so. Files of other kinds: [Real traffic](real-traffic.md).\n"
     )
     parts += ["### DAIDALUS (`traffic.daa_file`, `.daa` and `.xyz`)\n"]
     parts.append(_table((*names, "unit unless the row of units says another"), daa_columns()))

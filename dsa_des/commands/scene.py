@@ -22,8 +22,10 @@ from dsa_des.running.reports import (
     say_notes,
 )
 from dsa_des.running.simulation import Simulation
+from dsa_des.scene.data_files import scene_of_data
 from dsa_des.scene.examples import chosen_file
-from dsa_des.scene.scene import Scene, load_scene
+from dsa_des.scene.scene import Scene, load_scene, load_tables
+from dsa_des.scene.scene_file import read_scene_tables
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import say, say_json
@@ -50,7 +52,13 @@ def load(
 ) -> Scene:
     """Load and check a scene; notes on that go to standard error, unless they are printed later."""
     path = chosen_file(scene, "scene")
-    loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
+    data = scene_of_data(path)
+    if data is None:
+        loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
+    else:
+        file = read_scene_tables(data.tables, path.name)
+        loaded = load_tables(file, sets, swaps, seed, duration)
+        loaded.about = data.about
     if not noted:
         say_notes(notes_of_loading(loaded))
     return loaded
@@ -132,6 +140,8 @@ def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
     with no_collection(), imports(Imports(allowed=not no_import, announce=announce)) as policy:
         loaded = load(**options, noted=True)
         scene = options["scene"]
+        for line in loaded.about:
+            say(line)
         if no_import and policy.seen:
             say(
                 f"{scene}: nothing wrong as far as it was checked. {len(loaded.blocks)} blocks; "

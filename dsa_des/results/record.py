@@ -119,6 +119,9 @@ class Result:
         its mean ends there.
     quantile : float, optional
         Of a number: it is summed up by this quantile over the units, not the mean.
+    unseen : str, optional
+        Of a number that is 0 where nothing was seen: the column of what one event would have added;
+        where all units have 0, the interval reaches to what may be unseen.
     """
 
     name: str
@@ -132,6 +135,7 @@ class Result:
     least: float | None = None
     most: float | None = None
     quantile: Annotated[float, Field(gt=0, lt=1)] | None = None
+    unseen: str | None = None
 
     @property
     def bounds(self) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from dsa_des.files.sealed_files import read_regular
+from dsa_des.record.undone import undone_sentences
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.labels import AxisName, axis_label, readable, short, value_label
 from dsa_des.results.models import (
@@ -79,7 +80,7 @@ def study_report(folder: StudyFolder) -> bytes:
             for scene in (explained.scenes if explained else ()) for e in scene.effects if e.bound
         ],
         heads=[*map(axis_label, tables.rows.axes), "result", "value", "interval", "units",
-               "no value", "", "cut off", "expected"],
+               "no value", "note", "cut off", "expected"],
         shown=[_line(line) for line in tables.shown_lines()[:_MOST_SHOWN]],
         lines=[_line(line, exact=True) for line in tables.lines[:_MOST_ROWS]],
         few=any(line.estimate.few for line in tables.lines),
@@ -104,6 +105,7 @@ def study_report(folder: StudyFolder) -> bytes:
             (row["cell"], row["replica"], row["status"], row["error"], record.command(row))
             for row in stored.failed
         ],
+        undone=undone_sentences(folder.undone()),
         packages=[(name, begun.get(name, ""), now.get(name, "")) for name in {**begun, **now}],
         hashes=_hashes(folder),
         commands=[

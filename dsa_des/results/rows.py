@@ -39,6 +39,7 @@ from dsa_des.results.statistics import (
     mean,
     normal_error,
     quantile,
+    rare,
     share,
     symmetric,
 )
@@ -263,6 +264,9 @@ class Rows:
                 return quantile(of_units, result.quantile, confidence), missing
             if result.kind == FRACTION:
                 return fraction(of_units, confidence), missing
+            if result.unseen is not None:
+                more = self.by_unit(result.unseen, rows)[1]
+                return rare(of_units, more, confidence), missing
             return mean(of_units, confidence, method), missing
         trials = np.ones(len(rows))
         if result.kind == SHARE:

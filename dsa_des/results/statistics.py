@@ -16,6 +16,8 @@ FEW_UNLIKE = 5
 _RESAMPLES = 2000
 #: Of the largest of some values: a smaller difference is one of rounding.
 _ALIKE = 1e-9
+#: No interval of a logarithm is wider.
+_MOST_LOG = 700.0
 
 
 @dataclass(frozen=True)
@@ -146,6 +148,24 @@ def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
         below, above = _bootstrap(part, confidence) or (below, above)
     low, high = value - below * error, value + above * error
     return Estimate(value, low, high, count, count < FEW)
+
+
+def rare(values: FloatArray, more: FloatArray, confidence: float) -> Estimate:
+    """Return the mean of independent estimates of one rare probability; NaN ones are left out.
+
+    Such estimates are products, and skewed: the interval is that of Student's t for the logarithm
+    of the mean. Where all are 0 it ends where Poisson's law lets nothing be seen as often as an end
+    may err; `more` is what one event more would have added to each.
+    """
+    plain = mean(values, confidence)
+    if plain.count < 2:
+        return plain
+    if plain.value > 0.0:
+        factor = math.exp(min(plain.half_width / plain.value, _MOST_LOG))
+        return replace(plain, low=plain.value / factor, high=min(1.0, plain.value * factor))
+    expected = -math.log((1.0 - confidence) / 2.0)
+    known = more[~np.isnan(more)]
+    return replace(plain, high=min(1.0, expected * float(known.mean()) / len(known)))
 
 
 def quantile(values: FloatArray, share: float, confidence: float) -> Estimate:

@@ -237,5 +237,5 @@ class WireFaults:
         return np.rint(self._drawn(self.jitter, sent) * self.jitter_ticks).astype(np.int64)
 
     def _drawn(self, stream: Stream, sent: RunTicks) -> FloatArray:
-        instant = nanosecond_of(sent.tick, self.ticks_per_s).astype(np.uint64)
-        return stream.of_runs(sent.run).uniform(instant, 0)
+        instant = nanosecond_of(sent.tick, self.ticks_per_s)
+        return stream.of_runs(sent.run, instant).uniform(instant.astype(np.uint64), 0)

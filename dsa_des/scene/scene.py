@@ -93,6 +93,8 @@ class Scene:
     processors: dict[str, ProcessorParameters] = field(default_factory=dict)
     dropped: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    #: What is in the file that it was made of, where that is no scene.
+    about: list[str] = field(default_factory=list)
     #: The tables it was made of, changes included.
     _tables: SceneFile | None = field(default=None, init=False, compare=False)
     _origin: tuple[SceneFile, tuple[Change, ...]] | None = field(

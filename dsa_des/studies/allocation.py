@@ -1,20 +1,21 @@
 """Which runs are flown where all are known without flying: drawn by what they can contribute.
 
-A study of a ratio knows of every run what happens without a remedy, and its geometry, for a
-twentieth of the cost of flying it with one. The first `PILOT` runs of a cell are all flown. From
-them the chance p(x) of each event is learnt, by a logistic model of the geometry x, and then a run
-is flown with a probability π(x) of its own and stands for 1/π runs (`dsa_des.results.ratio`). A
-wrong p(x) costs width, never truth. With weights w and nominal flags n the variance of a ratio R is
-that of Σ w (m/π - R n), of which only Σ w² p/π depends on π; so with costs c of knowing and 1 of
-flying
+A study of a ratio knows of every run what happens without a remedy, and its geometry x, for a
+twentieth of the cost of flying it with one. A run is flown with a probability π(x) of its own and
+stands for 1/π runs (`dsa_des.results.ratio`). π follows from the chance p(x) of each event: in the
+first round, of `PILOT` runs, from what metrics expect; then from a logistic model beside it, learnt
+from all that was flown before. A wrong p(x) costs width, never truth. With weights w and nominal
+flags n the variance of a ratio R is that of Σ w (m/π - R n), of which only Σ w² p/π depends on π;
+so with costs c of knowing and 1 of flying
 
     π ∝ w √(Σ_e p_e / V_e),   of the size that makes  Σ_e V_e(π) / V_e · (Σ π + N c)  least,
 
 V_e being the variance of event e with every run flown. It is Neyman's rule for a sample in two
 phases (J. Neyman, "Contribution to the theory of sampling human populations", Journal of the
 American Statistical Association 33, 1938; C.-E. Särndal, B. Swensson & J. Wretman, "Model assisted
-survey sampling", 1992, chapter 9). No π is below `LEAST`: what nobody expects must be seen too, and
-weighs 1/π then. What was flown teaches the next round, four times as large.
+survey sampling", 1992, chapter 9). No π is below `LEAST`, and in the first round below
+`FIRST_LEAST`: what nobody expects must be seen too, and weighs 1/π then. Rounds are few, because
+each flies a lock step of its own, whose windows cost as much as a thousand runs.
 
 Pure functions of arrays; which columns they are is said by `dsa_des.studies.foreseen`.
 """
@@ -27,17 +28,19 @@ import numpy as np
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.results.ratio import FORESEEN_COST
 
-#: Runs of a cell that are all flown, and how many times as many are known after each round.
-PILOT, GROWTH = 300, 4
-#: The least probability to be flown.
-LEAST = 0.02
+#: Runs of the first round of a cell, and how many times as many are known after each round.
+PILOT, GROWTH = 500, 20
+#: A round that would begin within the last third of the runs is none.
+_LAST_THIRD = 1.5
+#: The least probability to be flown, and before anything is learnt.
+LEAST, FIRST_LEAST = 0.02, 0.3
 #: All are flown unless a sample is expected to cost less than this for the same width.
-_WORTH_IT = 0.9
+_WORTH_IT = 0.8
 #: The chance that is expected of an event of which nothing is told.
 UNTOLD = 0.05
-# Standard deviations of the model's coefficients before anything is flown: of the level, and for
-# one standard deviation of geometry, or its square.
-_LEVEL_SD, _SLOPE_SD = 3.0, 0.25
+# Standard deviations of the model's coefficients before anything is flown: of the level, of how far
+# what is expected is believed, and for one standard deviation of geometry, or its square.
+_LEVEL_SD, _BELIEF_SD, _SLOPE_SD = 3.0, 0.5, 0.25
 _ITERATIONS = 50
 # Sizes of π that are tried.
 _SIZES = np.geomspace(1e-3, 1e6, 200)
@@ -71,13 +74,15 @@ class Allocation:
     precision: FloatArray
     #: How much π is for each w √(Σ p/V); infinite where all are flown.
     size: float
+    #: The least probability.
+    least: float = LEAST
     #: Of the runs it was learnt from, so many would be flown.
     share: float = 1.0
 
     def probabilities(self, runs: ForeseenRuns) -> FloatArray:
         """Return the probability with which each run is flown, (runs,)."""
         worth = np.sqrt(_combined(self.precision, self._chances(runs)))
-        return flown_with(runs.weight * worth, self.size)
+        return flown_with(runs.weight * worth, self.size, self.least)
 
     def _chances(self, runs: ForeseenRuns) -> FloatArray:
         terms = model_terms(self._scaled(runs.geometry), runs.nominal)
@@ -88,11 +93,11 @@ class Allocation:
         return np.where(np.isfinite(away), away, 0.0) / self.spread[:, None]
 
 
-def flown_with(worth: FloatArray, size: float) -> FloatArray:
-    """Return probabilities in proportion to what runs are worth, between `LEAST` and 1."""
+def flown_with(worth: FloatArray, size: float, least: float) -> FloatArray:
+    """Return probabilities in proportion to what runs are worth, from the least to 1."""
     if not np.isfinite(size):
         return np.ones(len(worth))
-    result: FloatArray = np.clip(size * worth, LEAST, 1.0)
+    result: FloatArray = np.clip(size * worth, least, 1.0)
     return result
 
 
@@ -104,17 +109,25 @@ def model_terms(scaled: FloatArray, nominal: FloatArray) -> FloatArray:
 
 def chances(terms: FloatArray, runs: ForeseenRuns, coefficients: FloatArray) -> FloatArray:
     """Return the chance of each event by the logistic models, (events, runs)."""
-    design = _design(terms)
+    offset = _offset(runs.expected)
     without, having = (
-        np.array([_combined(mine[k], design) for mine in coefficients]) for k in (0, 1)
+        np.array(
+            [
+                _combined(c[k], _design(terms, of))
+                for c, of in zip(coefficients, offset, strict=True)
+            ]
+        )
+        for k in (0, 1)
     )
-    score = np.where(runs.nominal > 0.0, having, without) + _offset(runs.expected)
+    score = np.where(runs.nominal > 0.0, having, without) + offset
     result: FloatArray = np.clip(_logistic(score), _LEAST_CHANCE, 1.0 - _LEAST_CHANCE)
     return result
 
 
-def learn(runs: ForeseenRuns, happened: FloatArray, stands_for: FloatArray) -> Allocation:
-    """Return the plan for further runs of a cell, from those that are known.
+def learn(
+    runs: ForeseenRuns, happened: FloatArray, stands_for: FloatArray, least: float = LEAST
+) -> Allocation:
+    """Return the plan for further runs of a cell, from those that are known, flown or not.
 
     Parameters
     ----------
@@ -122,7 +135,9 @@ def learn(runs: ForeseenRuns, happened: FloatArray, stands_for: FloatArray) -> A
     happened : (events, runs)
         Whether each event happened with the remedy; of those not flown anything.
     stands_for : (runs,)
-        For how many each stands, 0 of those not flown.
+        For how many each stands, 0 of those not flown; where none is, what is expected counts.
+    least : float
+        The least probability.
     """
     there = np.isfinite(runs.geometry)
     many = np.maximum(there.sum(axis=1), 1)
@@ -132,18 +147,18 @@ def learn(runs: ForeseenRuns, happened: FloatArray, stands_for: FloatArray) -> A
     spread = np.where(spread > 0.0, spread, 1.0)
     terms = model_terms(away / spread[:, None], runs.nominal)
     flown = stands_for > 0.0
-    fitted = np.zeros((len(happened), 2, 1 + len(terms)))
+    fitted = np.zeros((len(happened), 2, 2 + len(terms)))
     for event, (n, e, m) in enumerate(zip(runs.nominal, runs.expected, happened, strict=True)):
         for having in (0, 1):
             some = flown & ((n > 0.0) == having)
             weight = stands_for[some] / stands_for[some].mean() if some.any() else np.empty(0)
             fitted[event, having] = fit_chances(terms[:, some], e[some], m[some], weight)
-    precision, size = best_size(runs, chances(terms, runs, fitted))
-    plan = Allocation(middle, spread, fitted, precision, size)
+    precision, size = best_size(runs, chances(terms, runs, fitted), least)
+    plan = Allocation(middle, spread, fitted, precision, size, least)
     return replace(plan, share=float(plan.probabilities(runs).mean()))
 
 
-def best_size(runs: ForeseenRuns, chance: FloatArray) -> tuple[FloatArray, float]:
+def best_size(runs: ForeseenRuns, chance: FloatArray, least: float) -> tuple[FloatArray, float]:
     """Return 1/V of each event, and the size of π with the least variance times cost."""
     w, n = runs.weight, runs.nominal
     below = (w * n).sum(axis=1)
@@ -160,7 +175,7 @@ def best_size(runs: ForeseenRuns, chance: FloatArray) -> tuple[FloatArray, float
     scale = 1.0 / max(float(worth.max()), 1e-300)
     costs = []
     for size in _SIZES * scale:
-        pi = flown_with(worth, size)
+        pi = flown_with(worth, size, least)
         variance = float((w**2 * gone / pi).sum() + precision @ fixed)
         costs.append(variance * (float(pi.mean()) + FORESEEN_COST))
     best = int(np.argmin(costs))
@@ -175,11 +190,13 @@ def fit_chances(
     """Return the coefficients of the logistic model that are likeliest, given what was expected.
 
     Newton's method on the logarithm of the likelihood and of a normal distribution of the
-    coefficients; with no event at all it stays near what was expected before.
+    coefficients (level, belief, slopes); with no event at all it stays near what was expected. A
+    belief of 0 takes the logit of that as it is, one of -1 not at all.
     """
-    design, offset = _design(terms), _offset(expected)
+    offset = _offset(expected)
+    design = _design(terms, offset)
     sd = np.full(len(design), _SLOPE_SD)
-    sd[0] = _LEVEL_SD
+    sd[:2] = _LEVEL_SD, _BELIEF_SD
     prior, at = np.diag(1.0 / sd**2), np.zeros(len(design))
 
     def loss(coefficients: FloatArray) -> float:
@@ -209,8 +226,8 @@ def _combined(factors: FloatArray, terms: FloatArray) -> FloatArray:
     return result
 
 
-def _design(terms: FloatArray) -> FloatArray:
-    return np.concatenate([np.ones((1, terms.shape[1])), terms])
+def _design(terms: FloatArray, offset: FloatArray) -> FloatArray:
+    return np.concatenate([np.ones((1, len(offset))), offset[np.newaxis], terms])
 
 
 def _offset(expected: FloatArray) -> FloatArray:
@@ -228,10 +245,11 @@ def round_ends(replicas: int, batch: int | None) -> list[int]:
     """Return the replica before which each round ends; with a `batch`, rounds of so many."""
     if batch is not None:
         return [min(end, replicas) for end in range(batch, replicas + batch, batch)]
-    ends = [PILOT]
-    while ends[-1] < replicas:
-        ends.append(ends[-1] * GROWTH)
-    return [*ends[:-1], replicas]
+    ends, end = [], PILOT
+    while end * _LAST_THIRD < replicas:
+        ends.append(end)
+        end *= GROWTH
+    return [*ends, replicas]
 
 
 def drawn(probability: FloatArray, uniform: Sequence[float]) -> tuple[BoolArray, FloatArray]:

@@ -9,7 +9,8 @@ import gc
 import json
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
@@ -28,6 +29,7 @@ from dsa_des.files.sealed_files import parquet
 from dsa_des.record.undone import Undone, added
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas, undone_in
+from dsa_des.replicas.splitting import Flown, find_levels, repeated
 from dsa_des.results.folder import undone_of
 from dsa_des.results.record import (
     CRASHED,
@@ -41,11 +43,13 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Allocation
 from dsa_des.studies.foreseen import foresee, geometry_of, stands_for
-from dsa_des.studies.metric import Group, Metric, wanted_by
+from dsa_des.studies.metric import Group, Metric, SplitEvent, wanted_by
 from dsa_des.studies.study import Chunk, Study, set_text
 
 #: After so many runs at once a worker looks for garbage, or the next ones stand beside it.
 _MANY_RUNS = 64
+# New objects after which Python looks for garbage: the usual 700 take 4 % of a lock step.
+_OBJECTS_AT_ONCE = 50_000
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,22 @@ def run_chunk(study: Study, chunk: Chunk) -> Done:
 
 def run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[Done]:
     """Run chunks of one round together, each as it would be by itself."""
+    with _few_collections():
+        return _run_chunks(study, chunks)
+
+
+@contextmanager
+def _few_collections() -> Iterator[None]:
+    """Look for garbage seldom: what a lock step makes is there to its end."""
+    usual = gc.get_threshold()
+    gc.set_threshold(max(usual[0], _OBJECTS_AT_ONCE) if usual[0] else 0, *usual[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*usual)
+
+
+def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[Done]:
     began_s = time.process_time()
     schema = schema_of(study)
     tables: list[list[pa.Table]] = [[] for _ in chunks]
@@ -210,6 +230,9 @@ def _run_cell(
         return _table(study, schema, cell, rows, {})
     replicas = [study.replica(number, cell) for number in numbers]
     key = str(study.path), cell
+    if isinstance(metrics[0], SplitEvent):
+        rows["error"], values = _split(study, scene, metrics[0], cell, numbers, of, undone)
+        return _table(study, schema, cell, rows, values)
     if not study.allocate:
         values = _flown(scene, metrics, replicas, rows["error"], key, of, undone)
         return _table(study, schema, cell, rows, values)
@@ -229,6 +252,48 @@ def _run_cell(
         values[name] = _nothing(len(numbers), text=column.dtype == object)
         values[name][chosen] = column
     return _table(study, schema, cell, rows, values | known | {STANDS_FOR: shares})
+
+
+def _split(
+    study: Study,
+    scene: Scene,
+    metric: SplitEvent,
+    cell: int,
+    numbers: Sequence[int],
+    of: IntArray,
+    undone: Sequence[list[Undone]],
+) -> tuple[list[str | None], dict[str, AnyArray]]:
+    """Return the error of each of some repetitions, or None, and what they came to."""
+    table, key = study.splitting, (str(study.path), cell)
+    assert table is not None
+    score, candidates = table.score, metric.metric.scores[table.score]
+
+    def fly(runs: Sequence[Replica], number: IntArray, levels: Sequence[float]) -> Flown:
+        wrong: list[str | None] = [None] * len(runs)
+        near, said = [metric.scored(score, levels)], [*undone, []]  # that of the pilot is lost
+        known = _flown(scene, near, runs, wrong, key, np.append(of, len(undone))[number], said)
+        nothing = np.full(len(runs), np.nan)
+        times_s = [known.get(str(k), nothing) for k in range(len(levels))]
+        return Flown(np.array(times_s), known.get("weight", nothing), wrong)
+
+    known = repr((study.tables, study.base.data, study.seed, study.sets, study.swaps, cell))
+    try:
+        if table.levels is not None:
+            levels = (*table.levels, float(candidates[-1]))
+        elif (levels := _levels_found.get(known, ())) == ():
+            pilot = study.repetition(-1, cell), study.repetition_seed(-1, cell)
+            levels = _levels_found[known] = find_levels(*pilot, candidates, fly)
+    except ValueError as error:
+        return [str(error)] * len(numbers), {}
+    found = repeated(
+        [study.repetition(number, cell) for number in numbers],
+        [study.repetition_seed(number, cell) for number in numbers], levels, fly,
+    )  # fmt: skip
+    return [one.error for one in found], metric.told(found, levels)
+
+
+#: By all that fixes them: every process finds the levels of a study by itself, and the same ones.
+_levels_found: dict[str, tuple[float, ...]] = {}
 
 
 def _foreseen(

@@ -16,7 +16,16 @@ from dsa_des.results.folder import StudyFolder
 from dsa_des.results.record import EVENT, RATIO, STANDS_FOR, RatioOf, Result, geometry_column
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.allocation import PILOT, UNTOLD, Allocation, ForeseenRuns, drawn, learn
+from dsa_des.studies.allocation import (
+    FIRST_LEAST,
+    LEAST,
+    PILOT,
+    UNTOLD,
+    Allocation,
+    ForeseenRuns,
+    drawn,
+    learn,
+)
 from dsa_des.studies.draws import uniform
 from dsa_des.studies.metric import Group, Metric, expected_column
 from dsa_des.studies.study import AUTO, Study
@@ -127,14 +136,17 @@ def plans_of(
     study: Study, folder: StudyFolder, number: int, first: int, cells: Sequence[int]
 ) -> dict[int, Allocation]:
     """Return the plan of every cell for the round that begins with a replica, by earlier rounds."""
-    if not study.allocate or first < PILOT:
+    if not study.allocate:
         return {}
-    rows = Rows(StoredRows(folder, before_round=number), ["cell"], [])
     ratios = [
         one.ratio
         for one in ratios_of(folder.record.results, study.allocate)
         if one.ratio is not None
     ]
+    if first == 0:
+        first_plans = {cell: _first_plan(study, cell, ratios) for cell in cells}
+        return {cell: plan for cell, plan in first_plans.items() if plan is not None}
+    rows = Rows(StoredRows(folder, before_round=number), ["cell"], [])
     read = {geometry_column(name) for name in folder.record.geometry}
     read |= {name for of in ratios for name in of.reads()}
     plans = {}
@@ -146,5 +158,18 @@ def plans_of(
         if not (stood > 0.0).any():
             continue
         happened = [_of_class(columns, of, columns[of.above]) for of in ratios]
-        plans[int(cell)] = learn(_known(columns, ratios), np.array(happened), stood)
+        least = LEAST if first >= PILOT else FIRST_LEAST
+        plans[int(cell)] = learn(_known(columns, ratios), np.array(happened), stood, least)
     return plans
+
+
+def _first_plan(study: Study, cell: int, ratios: Sequence[RatioOf]) -> Allocation | None:
+    """Return the plan of a cell's first round, by what is expected of its runs; None flies all."""
+    replicas = [study.replica(n, cell) for n in range(min(PILOT, study.round_ends[0]))]
+    try:
+        scene = study.scene(cell)
+        columns = foresee(scene, [spec.build(scene) for spec in study.metrics], replicas)
+    except Exception:  # the rows of its runs say what is wrong
+        return None
+    none = np.zeros(len(replicas))
+    return learn(_known(columns, ratios), np.zeros((len(ratios), len(none))), none, FIRST_LEAST)

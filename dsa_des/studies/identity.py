@@ -48,6 +48,8 @@ def description_text(study: Study) -> str:
         identity["over"] = sorted(study.over)
     if study.allocate:
         identity["allocate"] = study.allocate
+    if study.splitting is not None:
+        identity["splitting"] = vars(study.splitting)
     try:
         files = files_of(study)
         identity["files"] = {str(path): file_digest(path) for path in sorted(files)}

@@ -22,6 +22,7 @@ from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.drawn_columns import ReplicaScenes, scenes_of
 from dsa_des.replicas.replicas import Recorded
+from dsa_des.replicas.splitting import Repeated
 from dsa_des.results.record import (
     CLASS,
     EVENT,
@@ -184,6 +185,9 @@ class Metric:
     #: Names of numbers that tell runs apart before they are run, which `foresee` gives besides.
     #: Those that `expected_column` names are the chances that it expects of an event.
     geometry: tuple[str, ...] = ()
+    #: Scores that tell how near a run comes to `scored_events` → levels that may be chosen by a
+    #: pilot, falling; the last is the event itself.
+    scores: Mapping[str, FloatArray] = {}
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         self.p = parameters
@@ -207,6 +211,24 @@ class Metric:
         """
         raise NotImplementedError
 
+    def scored_events(self) -> Sequence[str]:
+        """Return the events of which it knows how near a run comes (`reached_s`)."""
+        return ()
+
+    def reached_s(
+        self, group: Group, event: str, score: str, levels: Sequence[float]
+    ) -> FloatArray:
+        """Return when each replica first reached levels of a score, s, (levels, replicas).
+
+        NaN where it never did. Levels fall, the last one of `scores` is the event itself, and what
+        is reached by an instant depends on nothing later.
+        """
+        raise NotImplementedError
+
+    def unit_weights(self, group: Group) -> FloatArray:
+        """Return how often each replica's encounter happens, (replicas,)."""
+        return np.ones(len(group))
+
     def check(self, blocks: Mapping[str, Component]) -> None:
         """Raise ValueError for what is wrong and only blocks that are set up can tell.
 
@@ -216,6 +238,64 @@ class Metric:
     def expected(self, scene: Scene) -> Mapping[str, float]:
         """Return the analytic answer for a scene, for results that have one."""
         return {}
+
+
+class Nearness(Metric):
+    """When each run first reached levels of the score of an event, and how much it weighs."""
+
+    def __init__(self, metric: Metric, event: str, score: str, levels: Sequence[float]) -> None:
+        self._metric, self._asked = metric, (event, score, levels)
+        self.tables = metric.tables
+
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return the times, s, by the number of the level; NaN for never."""
+        times_s = self._metric.reached_s(group, *self._asked)
+        weights = self._metric.unit_weights(group)
+        return {"weight": weights} | {str(k): one for k, one in enumerate(times_s)}
+
+
+class SplitEvent(Metric):
+    """What a repetition tells of an event, which a metric gives of a run."""
+
+    def __init__(self, metric: Metric, event: str) -> None:
+        super().__init__(metric.p, metric.scene)
+        self.metric, self.event = metric, event
+        self.tables = metric.tables
+
+    def results(self) -> list[Result]:
+        """Return the probability, and how a repetition came to it."""
+        of = {result.name: result.meaning for result in self.metric.results()}
+        name = self.event
+        return [
+            Result(name, NUMBER, f"probability by splitting: {of.get(name, name)}",
+                   least=0.0, most=1.0, unseen=f"{name}.unseen"),
+            Result(f"{name}.unseen", NUMBER, "what one run more that comes to it would add"),
+            Result(f"{name}.collapsed", EVENT, "no run came to it: its P is 0, and counts"),
+            Result(f"{name}.runs", NUMBER, "runs that were flown", least=0.0),
+            Result(f"{name}.levels", CLASS, "levels of the score"),
+        ]  # fmt: skip
+
+    def scored(self, score: str, levels: Sequence[float]) -> Nearness:
+        """Return what tells when runs reach some levels of a score."""
+        return Nearness(self.metric, self.event, score, levels)
+
+    def told(self, found: Sequence[Repeated], levels: Sequence[float]) -> dict[str, AnyArray]:
+        """Return result → values of some repetitions; NaN and None of those that failed."""
+        text = ", ".join(f"{level:.4g}" for level in levels[:-1]) or "none"
+        values = {
+            "": [one.probability for one in found],
+            ".unseen": [one.unseen for one in found],
+            ".collapsed": [float(one.probability == 0.0) for one in found],
+            ".runs": [float(one.flown) for one in found],
+        }
+        failed = np.array([one.error is not None for one in found])
+        return {
+            f"{self.event}{name}": np.where(failed, np.nan, some) for name, some in values.items()
+        } | {f"{self.event}.levels": np.array([None if f else text for f in failed], dtype=object)}
+
+    def check(self, blocks: Mapping[str, Component]) -> None:
+        """Raise ValueError for what the metric itself finds wrong."""
+        self.metric.check(blocks)
 
 
 def expected_column(event: str) -> str:

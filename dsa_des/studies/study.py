@@ -24,9 +24,10 @@ from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.allocation import Allocation, round_ends
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, member_seed, replica_seed
-from dsa_des.studies.metric import Metric, find_metric
+from dsa_des.studies.metric import Metric, SplitEvent, find_metric
 from dsa_des.studies.study_tables import existing_file
 from dsa_des.text.safe_text import shell_line
+from dsa_des.time.randomness import key_of
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class MetricSpec:
     keys: Mapping[str, Any] = field(default_factory=dict)
     #: Its position in the study's list, for messages.
     index: int = 0
+    #: The event that splitting is for, of which repetitions then tell; none of a plain study.
+    splits: str = ""
 
     def build(self, scene: Scene) -> Metric:
         """Return the metric for a scene."""
@@ -46,9 +49,25 @@ class MetricSpec:
         try:
             with foreign_code(ValueError):
                 check_tables(cls, scene)
-                return cls(cls.Parameters.model_validate(dict(self.keys)), scene)
+                metric = cls(cls.Parameters.model_validate(dict(self.keys)), scene)
+                return SplitEvent(metric, self.splits) if self.splits else metric
         except ForeignFailure as error:
             raise ValueError(f"metric {self.name} cannot be made: {error}") from error.__cause__
+
+
+@dataclass(frozen=True)
+class Splitting:
+    """How the probability of an event is found by splitting.
+
+    Levels are of the score and fall; without any a pilot finds them.
+    """
+
+    event: str
+    #: By which runs that come near are told, of those that the metric has.
+    score: str
+    #: Of each stage of a repetition.
+    runs: int
+    levels: tuple[float, ...] | None = None
 
 
 #: For the sake of all ratios.
@@ -112,6 +131,8 @@ class Study:
     compare_weight: str | None = None
     #: Names of the ratios for whose sake a sample of the runs is flown, or `AUTO`; none: all are.
     allocate: tuple[str, ...] = ()
+    #: Where replicas are repetitions of splitting.
+    splitting: Splitting | None = None
     #: The command line that runs it again, whatever was changed of its file.
     repeat: str = ""
 
@@ -131,6 +152,11 @@ class Study:
     def cell_at(self, indices: Sequence[int]) -> int:
         """Return the cell with these indices."""
         return int(np.ravel_multi_index(tuple(indices), self._sizes)) if indices else 0
+
+    @property
+    def begun(self) -> int:
+        """How many runs of a cell are begun: replicas, or with splitting those of their stage."""
+        return self.replicas * (1 if self.splitting is None else self.splitting.runs)
 
     @property
     def batch(self) -> int:
@@ -179,6 +205,25 @@ class Study:
             replica_seed(seed, number),
             {draw.key: draw.value(seed, number, self.batch) for draw in self.draws},
         )
+
+    def repetition(self, number: int, cell: int) -> list[Replica]:
+        """Return the runs that a repetition of splitting begins with: each is one of a plain study.
+
+        Number -1 is the pilot, which has draws of its own.
+        """
+        assert self.splitting is not None
+        runs = range(self.splitting.runs)
+        if number >= 0:
+            return [self.replica(number * len(runs) + k, cell) for k in runs]
+        seed = self.repetition_seed(number, cell)
+        return [
+            Replica(replica_seed(seed, k), {d.key: d.value(seed, k, len(runs)) for d in self.draws})
+            for k in runs
+        ]
+
+    def repetition_seed(self, number: int, cell: int) -> int:
+        """Return the seed of the branches of a repetition."""
+        return key_of(self.member_seed(cell), "study splitting", number)
 
     def command(self, cell: int, number: int) -> str:
         """Return the command that runs one replica of a cell again."""

@@ -24,7 +24,7 @@ from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.axes import Axis, flatten_axes, label_of, parse_axis
 from dsa_des.studies.draws import Draw, flatten_draws, parse_draw
 from dsa_des.studies.metric import METRICS, find_metric
-from dsa_des.studies.study import MetricSpec, Study, changed_scene
+from dsa_des.studies.study import MetricSpec, Splitting, Study, changed_scene
 from dsa_des.studies.study_checks import check_cells
 from dsa_des.studies.study_tables import (
     AXES_OF_FIGURES,
@@ -32,6 +32,7 @@ from dsa_des.studies.study_tables import (
     CompareTable,
     FigureTable,
     RequirementTable,
+    SplittingTable,
     StopWhenTable,
     StudyKeys,
     resolved,
@@ -125,7 +126,8 @@ class _StudyReader:
                 raise SceneError([Problem(str(file.path), "", message)])
         keys = self.keys = self.plain_keys()
         draws = self.draws()
-        specs = self.metric_specs()
+        splitting = self.splitting()
+        specs = self.metric_specs(splitting)
         stop_when = self.stop_when()
         base, scene = self.scene()
         if base is None or scene is None:  # all else is checked against this scene
@@ -160,6 +162,7 @@ class _StudyReader:
             figures=self.figures(axes, cells),
             compare_weight=weight,
             requirements=self.requirements(axes),
+            splitting=splitting,
             allocate=() if keys.allocate is None else tuple(_listed(keys.allocate)),
             runs_per_chunk=keys.runs_per_chunk or max(1, min(1024, -(-runs // 16))),
             base=base,
@@ -346,12 +349,13 @@ class _StudyReader:
 
     # -- metrics ---------------------------------------------------------------------------
 
-    def metric_specs(self) -> tuple[MetricSpec, ...]:
+    def metric_specs(self, splitting: Splitting | None) -> tuple[MetricSpec, ...]:
         items = self.keys.metrics
         if not isinstance(items, list) or not items:
             shown = ", ".join(registered(METRICS))
             self.file.report(("metrics",), f"is required: a list of metrics; there are {shown}")
             return ()
+        event = splitting.event if splitting is not None and len(items) == 1 else ""
         specs: list[MetricSpec] = []
         for number, item in enumerate(items):
             key: Key = ("metrics", number)
@@ -369,8 +373,27 @@ class _StudyReader:
                 self.file.report(key, str(error), name)
                 continue
             if read_table(self.file, key, model, keys, f"metric {name}") is not None:
-                specs.append(MetricSpec(name, keys, number))
+                specs.append(MetricSpec(name, keys, number, event))
+        if splitting is not None and len(items) > 1:
+            said = "splitting is for one event: leave the one metric that gives it"
+            self.file.report(("metrics",), said)
         return tuple(specs)
+
+    def splitting(self) -> Splitting | None:
+        """Return the table of splitting, whose replicas are repetitions."""
+        if self.keys.splitting is None:
+            return None
+        table = read_table(self.file, ("splitting",), SplittingTable, self.keys.splitting)
+        if self.keys.replicas < 2:
+            said = "are the repetitions of splitting: its interval needs 2 or more, better 20"
+            self.file.report(("replicas",), said, self.keys.replicas)
+        for key, other in (("allocate", self.keys.allocate), ("over", self.keys.over)):
+            if other is not None:
+                self.file.report((key,), "does not go with splitting")
+        if table is None:
+            return None
+        levels = None if table.levels is None else tuple(table.levels)
+        return Splitting(table.event, table.score, table.runs, levels)
 
     def stop_when(self) -> StopWhen | None:
         if self.keys.stop_when is None:

@@ -2,16 +2,18 @@
 
 import math
 from collections.abc import Iterable, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
 
 from dsa_des.block.component import SourcedText
 from dsa_des.results.record import FigureKind, FigureRecord, as_text
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
-_NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when", "allocate")
+_NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when", "allocate",
+                   "splitting")  # fmt: skip
 #: The key of an axis whose values are patterns of file names.
 _PATTERNS = "files"
 
@@ -112,6 +114,7 @@ class StudyKeys(StudyTable):
     requirements: _Tables = []
     stop_when: Any = None
     allocate: str | list[str] | None = None
+    splitting: Any = None
     compare: Any = None
     over: str | list[str] | None = None
     confidence: float = Field(default=0.95, gt=0.5, lt=1.0)
@@ -125,6 +128,22 @@ class StopWhenTable(StudyTable):
     metric: _ResultName
     half_width: float = Field(gt=0)
     batch: int | None = Field(default=None, ge=2)
+
+
+class SplittingTable(StudyTable):
+    """Of which event a rare probability is found by splitting, and how."""
+
+    event: _ResultName
+    runs: int = Field(default=200, ge=10, le=100_000)
+    score: str = "time_to_go"
+    levels: list[Annotated[float, Field(gt=0)]] | None = None
+
+    @field_validator("levels")
+    @classmethod
+    def _fall(cls, levels: list[float] | None) -> list[float] | None:
+        if levels is not None and any(b >= a for a, b in pairwise(levels)):
+            raise ValueError("must fall, from far to near, for example [20, 12]")
+        return levels
 
 
 class CompareTable(StudyTable):

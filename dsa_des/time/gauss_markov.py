@@ -7,6 +7,7 @@ sees the same process, at the instants it happens to look.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -52,6 +53,10 @@ class GaussMarkov:
     tanh(h / 2 tau), independent of all that is outside. So it is drawn at knots more than 40 tau
     apart, independently, and then half-way between, again and again, down to the nanosecond: exact
     at each one, with a draw for each interval on the way (Lévy's construction of Brownian motion).
+
+    Where a run branches, the process goes on from the value that it has: from there on it is that
+    value, falling off by its correlation, and what another such process, of the branch's seed, adds
+    to it meanwhile.
     """
 
     def __init__(self, stream: Stream, correlation_time_s: float) -> None:
@@ -61,7 +66,7 @@ class GaussMarkov:
                 f"{LONGEST_S:g}"
             )
         self._stream = stream
-        tau_ns = correlation_time_s * NANOSECONDS
+        self._tau_ns = tau_ns = correlation_time_s * NANOSECONDS
         halvings = max(0, math.ceil(math.log2(_APART * tau_ns)))
         #: Two halvings a step: knots are 4**steps ns apart.
         self._steps = (halvings + 1) // 2
@@ -95,8 +100,28 @@ class GaussMarkov:
             raise ValueError(f"process is {process}: it must lie in [0, {MOST_PROCESSES})")
         instants = np.ascontiguousarray(instants_ns, dtype=np.int64)
         who = np.broadcast_to(np.asarray(targets, dtype=np.uint64), instants.shape)
-        stream = self._stream.of_runs(np.broadcast_to(run, instants.shape))
-        first = process * _LEVELS
+        runs = np.broadcast_to(run, instants.shape)
+        return self._after(self._stream.branches, who, instants, process * _LEVELS, runs)
+
+    def _after(
+        self, branches: int, who: Any, instants: IntArray, first: int, runs: IntArray
+    ) -> FloatArray:
+        """Return the values of runs that went on by the first so many of their branches."""
+        if not branches:
+            return self._drawn_by(self._stream.of_runs(runs), who, instants, first)
+        begin = self._stream.of_branches(runs, branches)[0]
+        before = self._after(branches - 1, who, np.minimum(instants, begin), first, runs)
+        later = np.flatnonzero(instants > begin)
+        if len(later):
+            begin, stream = self._stream.of_branches(runs[later], branches)
+            left = np.exp((begin - instants[later]) / self._tau_ns)
+            ends = (instants[later], begin)
+            now, then = (self._drawn_by(stream, who[later], at, first) for at in ends)
+            before[later] = left * before[later] + now - left * then
+        return before
+
+    def _drawn_by(self, stream: Stream, who: Any, instants: IntArray, first: int) -> FloatArray:
+        """Return the values that a stream draws."""
 
         def drawn(number: IntArray, level: int) -> tuple[FloatArray, FloatArray, FloatArray]:
             key = who + (number >> 32).astype(np.uint64) * _SPREAD

@@ -4,6 +4,9 @@ The key is (seed, block, purpose, target, scan, draw number), hashed into the ke
 Philox4x32-10 (Salmon, Moraes, Dror & Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11).
 Leaving out a scan, adding a target, swapping another block or changing the window therefore moves
 no other block's draws.
+
+A run *branches* by its seed: up to an instant it draws as the run that it comes from, and so is
+that run, and from then on by a seed of its own (`BranchedSeed`). No block's memory is copied.
 """
 
 from collections.abc import Callable, Sequence
@@ -93,19 +96,69 @@ def target_keys(names: tuple[str, ...]) -> UInt64Array:
     return np.frombuffer(digests, dtype="<u8").astype(np.uint64)
 
 
+class BranchedSeed(int):
+    """The seed of a run that draws by other seeds from some instants on.
+
+    Parameters
+    ----------
+    seed : int
+        By which it begins.
+    branches : sequence of (instant_ns, seed)
+        From which instant since the start of the run it draws by which seed, in order.
+    """
+
+    branches: tuple[tuple[int, int], ...]
+
+    def __new__(cls, seed: int, branches: Sequence[tuple[int, int]]) -> "BranchedSeed":
+        """Return the seed with its branches."""
+        result = super().__new__(cls, seed)
+        result.branches = tuple(branches)
+        return result
+
+    def __getnewargs__(self) -> tuple[int, tuple[tuple[int, int], ...]]:  # type: ignore[override]
+        return int(self), self.branches
+
+
+def branch(seed: int, from_ns: int, other: int) -> BranchedSeed:
+    """Return the seed of a run that draws as `seed` up to an instant, and then by another."""
+    before = [one for one in getattr(seed, "branches", ()) if one[0] < from_ns]
+    return BranchedSeed(int(seed), [*before, (from_ns, other)])
+
+
+#: When a branch begins that there is not, ns.
+_NEVER_NS = 2**62
+
+
 class Stream:
     """The draws of one block for one purpose; use one purpose for one distribution only.
 
     Of several runs, each with its own seed, `of_runs` tells the draws apart. `drew_for_all` says
     whether something was drawn for all of them, with the seed of the first, and `shared` that this
     is refused: who serves all runs draws for each.
+
+    What is drawn once for a run, or said to be of no instant, stays what it is in all branches of
+    it. `branches` is how many the runs have at most.
     """
+
+    branches = 0
+    _of_many = False
 
     def __init__(self, seed: int | Sequence[int], block: str, purpose: str) -> None:
         self._block, self._purpose = block, purpose
         self.drew_for_all = self.shared = False
         seeds = [seed] if isinstance(seed, int) else seed
-        keys = [key_of(one, block, purpose) for one in seeds]
+        self._of_many = len(seeds) > 1
+        later = [getattr(one, "branches", ()) for one in seeds]
+        self.branches = max(map(len, later))
+        keys = [key_of(int(one), block, purpose) for one in seeds]
+        if self.branches:
+            #: When each branch of a run begins, (runs, branches); keys are those of the runs, and
+            #: then those of their branches, one run after the other.
+            self._begin_ns = np.full((len(seeds), self.branches), _NEVER_NS, dtype=np.int64)
+            for number, some in enumerate(later):
+                self._begin_ns[number, : len(some)] = [instant for instant, _ in some]
+                after = [key_of(int(other), block, purpose) for _, other in some]
+                keys += after + [0] * (self.branches - len(some))
         self._keys = np.array(keys, dtype=np.uint64)
         low, high = keys[0] & _LOW, keys[0] >> 32
         #: Of each round: two numbers, or arrays of the rows' shape.
@@ -113,9 +166,30 @@ class Stream:
             ((low + first) & _LOW, (high + second) & _LOW) for first, second in _BUMPS
         ]
 
-    def of_runs(self, run: IntArray) -> "Stream":
-        """Return the draws of rows of these runs (`Wake.run`), each with its own run's seed."""
-        return self if len(self._keys) == 1 else _RunStream(self._rounds_of_all.take(run, axis=2))
+    def of_runs(self, run: IntArray, instant_ns: npt.ArrayLike | None = None) -> "Stream":
+        """Return the draws of rows of these runs (`Wake.run`), each with its own run's seed.
+
+        `instant_ns` says when since the start of its run each row is drawn, for what is drawn anew
+        at every instant: a draw of one key must always be of the same instant. Runs that branched
+        before then draw by their branch's seed; without it they draw as before they branched.
+        """
+        if len(self._keys) == 1:
+            return self
+        which = run
+        if self.branches and instant_ns is not None:
+            begun = self._begin_ns[run] <= np.asarray(instant_ns)[..., np.newaxis]
+            which = self._branch_keys(run, begun.sum(axis=-1))
+        return _RunStream(self._rounds_of_all.take(which, axis=2))
+
+    def of_branches(self, run: IntArray, number: int) -> tuple[IntArray, "Stream"]:
+        """Return when a branch of each run begins, ns, and its draws; the first is number 1."""
+        keys = self._branch_keys(run, np.full(np.shape(run), number))
+        return self._begin_ns[run, number - 1], _RunStream(self._rounds_of_all.take(keys, axis=2))
+
+    def _branch_keys(self, run: IntArray, number: IntArray) -> IntArray:
+        """Return which keys are those of branches of runs; number 0 is the run itself."""
+        later = len(self._begin_ns) + run * self.branches + number - 1
+        return np.where(number > 0, later, run)
 
     @cached_property
     def _rounds_of_all(self) -> UInt64Array:
@@ -129,7 +203,7 @@ class Stream:
     ) -> tuple[UInt64Array, UInt64Array, UInt64Array, UInt64Array]:
         if not 0 <= draw < 2**16:
             raise ValueError(f"draw is {draw}: it must lie in [0, 65536)")
-        if len(self._keys) > 1:
+        if self._of_many:
             self._draw_for_all()
         target = np.asarray(targets, dtype=np.uint64)
         numbers = np.asarray(scans, dtype=np.int64)

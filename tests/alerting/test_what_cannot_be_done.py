@@ -181,6 +181,10 @@ def test_a_study_says_it_of_all_its_runs(tmp_path: Path, monkeypatch: Any) -> No
     said = f"alerting: {NO_VELOCITY}: 5 of 10 (50 %)"
     assert said in result.output
     assert said in CliRunner().invoke(main, ["study", "show", "out"]).output
+    CliRunner().invoke(main, ["study", "report", "out", "--no-figures"], catch_exceptions=False)
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert f"<li>{said}</li>" in page
+    assert "<th scope='col'>note</th>" in page and "<td>few</td>" in page
     parts = sorted((tmp_path / "out" / "parts").glob("*.parquet"))
     assert len(parts) == 3
     assert b"dsa_des.about" in pq.read_schema(parts[0]).metadata

@@ -2,6 +2,7 @@
 
 import itertools
 import tracemalloc
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow as pa
@@ -9,7 +10,7 @@ import pyarrow.parquet as pq
 from hypothesis import given
 from hypothesis import strategies as st
 
-from components.display import recorded_rows
+from components.display import recorded_rows, tracks
 from components.display.recorded_rows import (
     Detected,
     index_in_groups,
@@ -234,3 +235,43 @@ def test_no_row_at_all_is_no_detection(tmp_path):
     assert Detected.read(tmp_path, ["a"]).names == []
     assert read_scans(tmp_path) == {}
     assert scans_between(tmp_path, 0.0, 1.0, {}) == {}
+
+
+def tracks_drawn(folder, groups):
+    """Return the peak of memory of reading the tracks of a run, three at each instant, in bytes."""
+    text = ("block", "track_status")
+    schema = pa.schema([(name, pa.string() if name in text else pa.float64())
+                        for name in tracks._COLUMNS])  # fmt: skip
+    schema = schema.set(schema.get_field_index("tick"), pa.field("tick", pa.int64()))
+    schema = schema.set(schema.get_field_index("track"), pa.field("track", pa.int64()))
+    schema = schema.set(schema.get_field_index("has_range"), pa.field("has_range", pa.bool_()))
+    rows = 6000
+    with pq.ParquetWriter(folder / "state_tracks.parquet", schema) as writer:
+        for number in range(groups):
+            instant = np.repeat(np.arange(number * rows // 3, (number + 1) * rows // 3), 3)
+            columns = {name: np.full(rows, 1.0) for name in tracks._COLUMNS}
+            columns |= {
+                "tick": instant * 500_000_000, "state_s": instant / 2.0,
+                "track": np.tile([1, 2, 3], rows // 3), "has_range": np.ones(rows, dtype=bool),
+                "block": ["tracker"] * rows, "track_status": ["confirmed"] * rows,
+            }  # fmt: skip
+            if number == 1:  # a short one, of two rows
+                columns["track"][7:9] = 4
+            writer.write_table(pa.table([columns[name] for name in schema.names], schema=schema))
+    tracemalloc.start()
+    found = tracks.DrawnTracks.read(SimpleNamespace(components={}), folder)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    counts = {one.number: len(one.columns["state_s"]) for one in found.tracks}
+    assert counts.pop(4) == 2
+    assert max(counts.values()) < 1.2 * min(counts.values())
+    kept = sum(counts.values())
+    assert min(groups * rows, 5000) * 0.7 < kept < 6000 * 1.2 + 600
+    return peak
+
+
+def test_drawing_tracks_takes_the_same_memory_however_long_the_run(tmp_path, monkeypatch):
+    """Every third row would be of one track alone; a short track is whole."""
+    monkeypatch.setattr(tracks, "_KEPT_ROWS", 6000)
+    tracks_drawn(tmp_path, 2)
+    assert tracks_drawn(tmp_path, 40) < 1.3 * tracks_drawn(tmp_path, 5)

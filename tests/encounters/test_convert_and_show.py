@@ -132,7 +132,7 @@ def test_published_encounters_have_their_published_closest_approaches(tmp_path: 
         assert slant == pytest.approx(told["min_slant_ft"], abs=15.0)
         assert closest.time_s[k] == pytest.approx(told["tca_s"], abs=0.3)
     # vs is in ft/s: altitudes change by it.
-    _, (_, _, _, up) = read_paired_text(files[4])[1]
+    _, _, _, up = read_paired_text(files[4])[0][1]
     assert np.abs(np.diff(up)).max() < 10
 
 

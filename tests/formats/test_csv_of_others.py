@@ -248,3 +248,48 @@ def test_check_tells_what_was_left_out_and_run_json_keeps_it(tmp_path, monkeypat
     assert done.exit_code == 0, done.stderr
     kept = json.loads((tmp_path / "r" / "run.json").read_text())["notes"]
     assert any("2 rows were left out" in note for note in kept)
+
+
+#: Two flights of one callsign, 300 km apart, and one of another; seconds, latitude, longitude.
+FIRST = [(10 * k, 47.0 + 0.02 * k, 8.0) for k in range(6)]
+SECOND = [(10 * k, 48.0, 12.0 - 0.03 * k) for k in range(4)]
+
+
+def shared(rows, ident="callsign"):
+    lines = [f"{t},DUP1,{lat!r},{lon!r},3000" for t, lat, lon in rows]
+    lines += [f"{10 * k},OTHER,46.{k},7,2000" for k in range(4)]
+    return "\n".join([f"time,{ident},lat,lon,alt", *lines, ""])
+
+
+@pytest.mark.parametrize("late_s", [0, 5, 3600])
+@pytest.mark.parametrize("ident", ["callsign", "id"])
+def test_two_aircraft_of_one_name_are_told_apart_where_none_could_fly_so(tmp_path, late_s, ident):
+    """At the same instants, in between, and an hour later, which no note can bridge."""
+    second = [(t + late_s, lat, lon + (10 if late_s > 99 else 0)) for t, lat, lon in SECOND]
+    if late_s > 99:  # on the other side of the Earth
+        second = [(t, -lat, lon + 170.0) for t, lat, lon in second]
+    file = read(tmp_path, shared(sorted(FIRST + second), ident))
+    assert [craft.name for craft in file.aircraft] == ["DUP1", "DUP1 (2)", "OTHER"]
+    one, other, _ = file.aircraft
+    assert one.lat_deg.tolist() == [lat for _, lat, _ in FIRST]
+    assert other.lat_deg.tolist() == [lat for _, lat, _ in second]
+    assert max(one.max_speed_mps, other.max_speed_mps) < 300.0
+    (said,) = [note for note in file.warnings if "DUP1" in note and "aircraft, for none" in note]
+    assert said == (
+        "DUP1: is 2 aircraft, for none flies so far from one sample to the next: 'DUP1' with 6, "
+        "'DUP1 (2)' with 4 samples"
+    )
+
+
+def test_one_aircraft_with_wrong_places_stays_one_and_an_address_is_one_aircraft(tmp_path):
+    """Two places gone wrong are no aircraft; and who is sure of its identity is not split."""
+    wrong = [FIRST[0], (15, 50.0, 8.0), *FIRST[1:], (57, 51.0, 8.0)]
+    file = read(tmp_path, shared(sorted(wrong)))
+    assert [craft.name for craft in file.aircraft] == ["DUP1", "OTHER"]
+    assert len(file.ownship.lat_deg) == 8
+    late = [(t + 5, lat, lon) for t, lat, lon in SECOND]
+    file = read(tmp_path, shared(sorted(FIRST + late), "hex"))
+    assert [craft.name for craft in file.aircraft] == ["DUP1", "OTHER"]
+    taken = shared(sorted(FIRST + late)) + "0,DUP1 (2),46,6,900\n9,DUP1 (2),46,6.01,900\n"
+    names = [craft.name for craft in read(tmp_path, taken).aircraft]
+    assert names == ["DUP1", "DUP1 (3)", "OTHER", "DUP1 (2)"]

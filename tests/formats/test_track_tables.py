@@ -124,8 +124,8 @@ def test_what_is_wrong_names_file_and_line_and_can_be_skipped(tmp_path: Path) ->
     assert "bad.csv: line 2: holds something else than numbers" in refused(own, bad)
     bad.write_text(HEAD + "1,0,0\n", encoding="utf-8")
     assert "line 2: has 3 values, but there are 9 columns" in refused(own, bad)
-    geodetic(bad, [(1, 0.0, 0.0, 3), (1, 0.0, 0.0, 3)])
-    assert "times must rise" in refused(own, bad)
+    geodetic(bad, [(1, 0.0, 0.0, 3), (1, 0.0, 0.0, 4)])
+    assert "bad.csv: 1: it is at two places at 1 s" in refused(own, bad)
     done = call("convert", own, bad, own, good, "--skip-damaged", "--out", out)
     assert done.exit_code == 0 and "1 damaged encounters were skipped" in done.stdout
     assert read_set(out).numbers.tolist() == [1]
@@ -149,8 +149,35 @@ def test_what_is_wrong_names_file_and_line_and_can_be_skipped(tmp_path: Path) ->
     states = np.zeros((1, 1), dtype=[("v_ftps", "O")])
     savemat(tmp_path / "object.mat", {"enc": MatlabObject(states, "ScriptedEncounter")})
     assert "MATLAB's class 'ScriptedEncounter'" in refused(tmp_path / "object.mat")
+    twice = matrix(1)
+    twice[0, 1] = twice[0, 0]
+    savemat(tmp_path / "twice.mat", {"a": twice, "b": matrix(2)})
+    assert "aircraft 1: it is at two places at" in refused(tmp_path / "twice.mat")
+
+
+def test_rows_that_stand_there_again_count_once_and_are_put_in_order(tmp_path: Path) -> None:
+    """As `traffic.csv` reads them: both tables and matrices give what the orderly ones do."""
+    orderly = geodetic(tmp_path / "own.csv", OWN), geodetic(tmp_path / "other.csv", OTHER)
+    assert call("convert", *orderly, "--out", tmp_path / "a.parquet").exit_code == 0
+    mixed = geodetic(tmp_path / "mixed.csv", [OWN[0], OWN[2], OWN[1], OWN[2], OWN[2]])
+    done = call("convert", mixed, orderly[1], "--out", tmp_path / "b.parquet")
+    assert done.exit_code == 0
+    assert f"note: {mixed}: 1: rows were not in the order of time and have been sorted" in (
+        done.stderr.replace("\n", " ")
+    )
+    assert f"note: {mixed}: 1: 2 of its samples stand there again and count once" in (
+        done.stderr.replace("\n", " ")
+    )
+    a, b = read_set(tmp_path / "a.parquet"), read_set(tmp_path / "b.parquet")
+    for row in (0, 1):
+        assert np.array_equal(np.stack(a.path(row)), np.stack(b.path(row)))
     savemat(tmp_path / "back.mat", {"a": matrix(1)[:, ::-1], "b": matrix(2)})
-    assert "aircraft 1: times must rise" in refused(tmp_path / "back.mat")
+    savemat(tmp_path / "on.mat", {"a": matrix(1), "b": matrix(2)})
+    for name in ("back", "on"):
+        out = tmp_path / f"{name}.parquet"
+        assert call("convert", tmp_path / f"{name}.mat", "--out", out).exit_code == 0
+    back, on = (read_set(tmp_path / f"{name}.parquet") for name in ("back", "on"))
+    assert np.array_equal(np.stack(back.path(0)), np.stack(on.path(0)))
 
 
 def test_a_matlab_file_of_version_7_3_is_called_that(tmp_path: Path) -> None:

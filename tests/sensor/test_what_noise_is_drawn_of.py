@@ -149,3 +149,41 @@ def test_ground_stands_among_the_rest_and_has_crossed_the_threshold_of_a_cell(ki
     names = ("confidence", "elevation_rad", "azimuth_rad", "range_m", "scan")
     measured = [[row[name] for row in found] for name in names]
     assert np.array_equal(np.lexsort(np.array(measured)), np.arange(len(found)))
+
+
+@pytest.mark.parametrize("sweeps", [False, True])
+def test_of_many_detections_only_neighbours_are_compared(monkeypatch, sweeps):
+    """Three runs of four scans with 700 each: 490,000 pairs of two, and what all would say."""
+    rng = np.random.default_rng(7)
+    scans, each = 12, 700
+    run, scan = np.repeat(np.arange(scans) // 4, each), np.repeat(np.arange(scans) % 4, each)
+    azimuth, elevation = rng.uniform(-0.9, 0.9, len(scan)), rng.uniform(-0.4, 0.4, len(scan))
+    some = np.flatnonzero(scan > 0)[::5]  # where somebody was one scan before, nearly
+    azimuth[some], elevation[some] = azimuth[some - each] + 2e-3, elevation[some - each]
+    range_m = rng.uniform(100.0, 3000.0, len(scan))
+    range_m[some] = range_m[some - each]
+    direction = np.column_stack([
+        np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), -np.sin(elevation)
+    ])  # fmt: skip
+    time_s = scan / 20.0 + (rng.uniform(0.0, 0.05, len(scan)) if sweeps else 0.0)
+    variance = rng.uniform(0.5, 1.0, len(scan)) * 1e-6
+    places = SeenPlaces(
+        run, scan, time_s, direction, range_m, variance,
+        np.full(len(scan), 400.0),
+    )  # fmt: skip
+    asked = np.flatnonzero(scan >= 1)
+    compared, near = [], declaration._near
+
+    def counted(places, one, other, *rest):
+        compared.append(len(one))
+        return near(places, one, other, *rest)
+
+    monkeypatch.setattr(declaration, "_near", counted)
+    gates = {"speed_m_s": 100.0, "rate_rad_s": 0.02}
+    found = scans_with_company(places, asked, 4, **gates)
+    few = sum(compared)
+    compared.clear()
+    monkeypatch.setattr(declaration, "_FEW_PAIRS", 10**12)
+    assert np.array_equal(found, scans_with_company(places, asked, 4, **gates))
+    assert np.count_nonzero(found > 1) > 300
+    assert sum(compared) == 3 * 6 * each**2 and few < 0.01 * sum(compared)

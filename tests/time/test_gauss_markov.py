@@ -21,6 +21,8 @@ def process(tau_s: float, seed: int = 1) -> GaussMarkov:
 class OneDraw:
     """Stands for a stream: notes which draws are asked for, or gives 1 for one of them, else 0."""
 
+    branches = 0
+
     def __init__(self):
         self.known = {}
 

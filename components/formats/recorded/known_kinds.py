@@ -14,6 +14,7 @@ from components.formats.recorded import ulog_file
 from components.formats.recorded.autopilot_logs import is_tlog, tlog_log, ulog_log
 from components.formats.recorded.captures import is_capture, udp_payloads
 from components.formats.recorded.igc_file import igc_log, is_igc
+from components.formats.recorded.json_records import is_json, record_json
 from components.formats.recorded.xml_tracks import xml_log
 from components.formats.recording import Recording
 from components.formats.reports import Log, recording_of
@@ -22,6 +23,7 @@ from components.formats.text_rows import (
     ALL_TOKENS,
     NO_UNIT,
     Problems,
+    TrafficFileError,
     clean_token,
     each_line,
     read_content,
@@ -36,6 +38,8 @@ KINDS = (
     "tables with time, name, latitude, longitude and altitude, .daa and .xyz of DAIDALUS, GPX, KML "
     "with times, IGC, PX4's .ulg, MAVLink's .tlog, and ASTERIX, also in pcap and pcapng"
 )
+#: So many of the needed columns may be missing of what is taken for a table of ours.
+_LACKING = 3
 _PARQUET, _ZIP = b"PAR1", b"PK\x03\x04"
 #: How files of other kinds begin, and what to do with them.
 _OTHERS = (
@@ -75,7 +79,7 @@ def record(
     data = _unzipped(problems, read_content(path, problems))
     stem = re.sub(r"(\.\w{1,7}){1,2}$", "", path.name) or path.name
     if data.startswith(_PARQUET):
-        return _of_parquet(problems, data, altitude)
+        return _of_parquet(problems, data, altitude, stem)
     if is_capture(data):
         return _of_capture(problems, data, altitude)
     if path.suffix.lower() == ".ast" or _is_asterix(data):
@@ -83,6 +87,8 @@ def record(
     log = _log_of(problems, data, stem)
     if log is not None:
         return recording_of(problems, log, None, altitude)
+    if is_json(data):
+        return record_json(problems, data, None, altitude, stem)
     for begins, said in _OTHERS:
         if data.startswith(begins):
             problems.fail(f"{said}; what is read: {KINDS}")
@@ -90,7 +96,16 @@ def record(
     del data
     if path.suffix.lower() in (".daa", ".xyz") or _is_daa(text):
         return record_daa(problems, text, reference)
-    return record_table(problems, text, None, altitude, least=1)
+    try:
+        return record_table(problems, text, None, altitude, stem)
+    except TrafficFileError as error:
+        if sum("there is no column" in problem for problem in error.problems) < _LACKING:
+            raise
+    problems = Problems(str(path))
+    problems.fail(
+        "is of no known kind. As a table it must have a row of names with columns for time, "
+        f"latitude, longitude and altitude, and one of names; what is read: {KINDS}"
+    )
 
 
 def _log_of(problems: Problems, data: bytes, stem: str) -> Log | None:
@@ -170,7 +185,7 @@ def _is_daa(text: str) -> bool:
 _BATCH = 16_384
 
 
-def _of_parquet(problems: Problems, data: bytes, altitude: Altitude | None) -> Recording:
+def _of_parquet(problems: Problems, data: bytes, altitude: Altitude | None, stem: str) -> Recording:
     """Return the aircraft of a Parquet table, which has the columns of a CSV table."""
     import pyarrow as pa
     import pyarrow.compute as pc
@@ -207,6 +222,4 @@ def _of_parquet(problems: Problems, data: bytes, altitude: Altitude | None) -> R
         except (pa.ArrowException, OSError, ValueError) as error:
             problems.fail(f"the Parquet file is damaged ({error})")
 
-    return record_rows(
-        problems, headers, 1, rows(), None, altitude, least=1, kind="a Parquet table"
-    )
+    return record_rows(problems, headers, 1, rows(), None, altitude, stem, kind="a Parquet table")

@@ -114,7 +114,7 @@ class _FlownCourse:
                 f"blocks.camera.range_km={range_m / 1000.0}",
                 "blocks.camera.azimuth_deg=[-180, 180]",
                 f"blocks.avoidance.direction={self.direction}",
-                f"blocks.avoidance.turn_deg={self.turn_deg}",
+                f"blocks.avoidance.turn_deg={self.turn_deg}", "record.truth=true",
             ],
             duration_s=f"{self.duration_s:g}",
         )  # fmt: skip

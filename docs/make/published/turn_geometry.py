@@ -141,8 +141,10 @@ def as_searched_m(range_m: float, closing_mps: float) -> float:
     end_s = _to_next_step(np.array([BEFORE_S - short_s]))[0]
     instants_s = _to_next_step(end_s * np.arange(2**HALVINGS + 1) / 2**HALVINGS)
     latest_s = BEFORE_S - range_m / closing_mps + STEPS_LATE * TIME_STEP_S
-    turn_s = float(instants_s[instants_s <= latest_s + 1e-9].max())
-    return float((BEFORE_S - short_s - turn_s) * closing_mps)
+    in_time_s = instants_s[instants_s <= latest_s + 1e-9]
+    if not len(in_time_s):  # slower than by its disc in so long: no turn of theirs is early enough
+        return math.inf
+    return float((BEFORE_S - short_s - float(in_time_s.max())) * closing_mps)
 
 
 def _to_next_step(time_s: FloatArray) -> FloatArray:

@@ -68,7 +68,7 @@ class Breaking(EncounterWeight):
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Scene and set; the first 20 runs are the pilot."""
+    """Scene and set; the first 20 runs are the first round."""
     for module in (allocation, foreseen):
         monkeypatch.setattr(module, "PILOT", 20)
     for name, text in (("made", RECIPE), ("scene", SCENE)):
@@ -100,7 +100,8 @@ def test_flown_runs_are_those_of_the_whole_study_and_the_ratio_is_that_of_their_
     part = rows(part_folder)
     stands_for = np.array(part["stands_for"])
     assert part["error"] == [None] * 60
-    assert (stands_for[:20] == 1.0).all() and 0 < (stands_for == 0.0).sum() < 40
+    assert stands_for[:20].max() <= 1.0 / allocation.FIRST_LEAST
+    assert 0 < (stands_for == 0.0).sum() < 60
     for name in whole:
         if name.endswith(("_mitigated", "manoeuvred", "needless_manoeuvre")):
             for here, there, s in zip(part[name], whole[name], stands_for, strict=True):

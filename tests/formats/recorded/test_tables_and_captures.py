@@ -1,0 +1,170 @@
+"""OpenSky's history in CSV and Parquet, tables of one flight, and ASTERIX in captures."""
+
+import json
+import random
+from datetime import UTC, datetime
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import recorded_files as write
+
+from components.formats.asterix_records import ADS_B, AsterixRecord, write_records
+from components.formats.recorded.known_kinds import record
+from components.formats.text_rows import TrafficFileError
+
+START = 1_717_243_200
+
+
+def history() -> dict[str, list]:
+    """State vectors each second; the position of the second aircraft is new every third one."""
+    rows: dict[str, list] = {
+        name: []
+        for name in ("time", "icao24", "lat", "lon", "velocity", "heading", "vertrate", "callsign",
+                     "onground", "squawk", "baroaltitude", "geoaltitude", "lastposupdate",
+                     "lastcontact")
+    }  # fmt: skip
+    for k in range(12):
+        for name, at in (("4b1805", k), ("3c6444", k - k % 3)):
+            one = (
+                START + k, name, 47 + 0.001 * at, 8.0, 111.2, 0.0, None if k == 4 else 0.0,
+                f"SWR{name[0]}  ", False, None, 1000.0 + k, None if name[0] == "3" else 1050.0 + k,
+                START + at - 0.25, START + k - 0.1,
+            )  # fmt: skip
+            for column, value in zip(rows.values(), one, strict=True):
+                column.append(value)
+    return rows
+
+
+def as_csv(rows: dict[str, list]) -> bytes:
+    lines = [",".join(rows)]
+    lines += [
+        ",".join("" if v is None else str(v) for v in row)
+        for row in zip(*rows.values(), strict=True)
+    ]
+    return "\n".join(lines).encode()
+
+
+def as_parquet(tmp_path, rows, **columns) -> bytes:
+    path = tmp_path / "made"
+    pq.write_table(pa.table({**rows, **columns}), path)
+    return path.read_bytes()
+
+
+def read(tmp_path, name, data, **options):
+    path = tmp_path / name
+    path.write_bytes(data)
+    return record(path, **options)
+
+
+def as_json(rows: dict[str, list], *, lines: bool) -> bytes:
+    records = [dict(zip(rows, row, strict=True)) for row in zip(*rows.values(), strict=True)]
+    return ("\n".join(map(json.dumps, records)) if lines else json.dumps(records)).encode()
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "times", "json", "jsonl"])
+def test_positions_of_opensky_count_when_they_were_received(tmp_path, kind):
+    rows = history()
+    data = as_csv(rows) if kind == "csv" else as_json(rows, lines=kind == "jsonl") if (
+        kind.startswith("json")
+    ) else as_parquet(
+        tmp_path, rows, **({"lastposupdate": pa.array(
+            [datetime.fromtimestamp(t, UTC) for t in rows["lastposupdate"]]
+        )} if kind == "times" else {}),
+    )  # fmt: skip
+    found = read(tmp_path, f"states.{kind}", data)
+    one, two = found.samples["4b1805"], found.samples["3c6444"]
+    assert one["time"] == pytest.approx(START - 0.25 + np.arange(12), abs=1e-6)
+    assert two["time"] == pytest.approx(START - 0.25 + 3 * np.arange(4), abs=1e-6)
+    assert two["lat"] == pytest.approx([47.0, 47.003, 47.006, 47.009])
+    # Geometric where there is one; the other has none.
+    assert one["alt"].tolist() == [1050.0 + k for k in range(12)]
+    assert two["alt"].tolist() == [1000.0 + 3 * k for k in range(4)]
+    pressed = read(tmp_path, f"states.{kind}", data, altitude="barometric").samples["4b1805"]
+    assert pressed["alt"].tolist() == [1000.0 + k for k in range(12)]
+
+
+def test_a_table_without_names_is_the_flight_of_its_file(tmp_path):
+    table = b"timestamp,latitude,longitude,altitude_ft\n1,47,8,1000\n2,47.001,8,1000\n"
+    found = read(tmp_path, "morning.csv", table)
+    assert list(found.samples) == ["morning"]
+    assert found.samples["morning"]["alt"] == pytest.approx([304.8, 304.8])
+
+
+def test_units_of_autopilots_and_cells_of_several_lines(tmp_path):
+    table = (
+        'time_us,id,lat_dege7,"lon (1e-7 deg)",alt_mm,speed_mph,track,vs,remark\n'
+        '1000000,a,470000000,80000000,1000000,100,90,0,"one,\n\ntwo"\n'
+        "2000000,a,470000000,80005868,1000000,100,90,0,\n"
+        "2000000,a,470000000,80005868,1000000,100,90,0,\n"
+    )
+    found = read(tmp_path, "t.csv", table.encode())
+    one = found.samples["a"]
+    assert one["time"].tolist() == [1.0, 2.0] and one["lat"].tolist() == [47.0, 47.0]
+    assert one["lon"] == pytest.approx([8.0, 8.0005868]) and one["alt"].tolist() == [1000.0] * 2
+    assert one["ve"] == pytest.approx([44.704, 44.704])
+    found.notes.settle()
+    assert found.notes.warnings == ["a: 1 of its samples stand there again and count once"]
+
+
+def adsb(times=range(5)) -> list[bytes]:
+    return [
+        write_records([AsterixRecord(ADS_B, 43_200.0 + t, {
+            "number": 0x3C6444, "lat_deg": 47.0 + 0.001 * t, "lon_deg": 8.0,
+            "flight_level_m": 1524.0,
+        })])
+        for t in times
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("make", [write.pcap, write.pcapng])
+def test_asterix_is_read_out_of_captures_with_their_day(tmp_path, make):
+    pytest.importorskip("asterix", reason="needs asterix")
+    sent = [(START + 0.4 + k, block) for k, block in enumerate(adsb())]
+    sent.insert(2, (START + 1.5, b"GET / HTTP/1.1"))
+    found = read(tmp_path, "udp.dump", make(sent))
+    (one,) = found.samples.values()
+    assert one["time"] == pytest.approx(START + np.arange(5.0), abs=1 / 256)
+    assert one["lat"] == pytest.approx(47.0 + 0.001 * np.arange(5), abs=1e-6)
+    assert one["alt"] == pytest.approx([1524.0] * 5)
+    assert found.notes.warnings == ["1 datagrams are no ASTERIX and were left out"]
+
+
+KINDS = {
+    "a.csv": lambda _: as_csv(history()),
+    "a.parquet": lambda tmp_path: as_parquet(tmp_path, history()),
+    "a.pcap": lambda _: write.pcap([(START + k, block) for k, block in enumerate(adsb())]),
+    "a.pcapng": lambda _: write.pcapng([(START + k, block) for k, block in enumerate(adsb())]),
+    "a.ast": lambda _: b"".join(adsb()),
+}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_damaged_file_gives_one_error_or_whole_flights(tmp_path, name):
+    if name in ("a.pcap", "a.pcapng", "a.ast"):
+        pytest.importorskip("asterix", reason="needs asterix")
+    whole, rng = KINDS[name](tmp_path), random.Random(name)
+    for _ in range(50):
+        raw = bytearray(whole)
+        for _ in range(rng.choice((1, 1, 2, 5))):
+            at = rng.randrange(len(raw) or 1)
+            kind = rng.random()
+            if kind < 0.4:
+                raw[at : at + 1] = rng.randbytes(1)
+            elif kind < 0.6:
+                del raw[at : at + rng.randrange(1, 40)]
+            elif kind < 0.8:
+                raw[at:at] = rng.randbytes(rng.randrange(1, 9))
+            else:
+                raw = raw[: max(at, 1)]
+        path = tmp_path / name
+        path.write_bytes(bytes(raw))
+        try:
+            file = record(path).flights()
+        except TrafficFileError as error:
+            assert 1 <= len(error.problems) <= 20
+            continue
+        for one in file.aircraft:
+            states = one.at(one.sample_times_s).arrays()
+            assert all(np.isfinite(values).all() for values in states)

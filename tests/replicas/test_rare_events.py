@@ -1,0 +1,275 @@
+"""Rare events by splitting, held against closed forms."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from dsa_des.errors import SceneError
+from dsa_des.files.toml_files import to_toml
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.splitting import Flown, chosen_of, find_levels, repeated
+from dsa_des.results.statistics import rare
+from dsa_des.studies.chunk import run_chunk
+from dsa_des.studies.study_file import read_study
+from dsa_des.time.randomness import Streams
+
+S = 10**9
+#: A run turns away at a whole second with this probability if it has not before; who has not at
+#: second 20 meets with the event. Its time to go is 20 s less the second, until it turns.
+STAYS, LAST = 0.6, 20
+CANDIDATES = np.array([*range(LAST, -1, -1)], dtype=float)
+RARE = STAYS**LAST
+
+
+def chain(runs, of, levels, weights=None):
+    """When runs reach some times to go, s."""
+    number, second = np.arange(len(runs)).repeat(LAST), np.tile(np.arange(LAST), len(runs))
+    stream = Streams([run.seed for run in runs]).stream("pilot", "turn").of_runs(number, second * S)
+    u = stream.uniform(np.zeros(len(number), np.uint64), second).reshape(-1, LAST)
+    turned = np.where((u >= STAYS).any(axis=1), (u >= STAYS).argmax(axis=1), LAST)
+    # At second t it is known whether it turned before t; a branch draws anew a little later.
+    at_s = [np.where(LAST - level <= turned, LAST - level - 0.5, np.nan) for level in levels]
+    ones = np.ones(len(runs)) if weights is None else weights(runs)
+    return Flown(np.array(at_s), ones, [None] * len(runs))
+
+
+def roots(repetition, count=50):
+    return [Replica(1000 * repetition + k) for k in range(count)]
+
+
+def test_levels_are_reached_by_a_fifth_of_the_runs_of_a_stage():
+    levels = find_levels(roots(0, 400), 5, CANDIDATES, chain)
+    assert levels[-1] == 0.0
+    steps = -np.diff([LAST, *levels])
+    # 0.6^3 = 0.216 is the least power that is a fifth.
+    assert set(steps[:-1]) <= {2, 3} and steps.mean() > 2.4
+
+
+def of_many(repetitions):
+    """The estimates of some repetitions of a probability of 3.7e-5."""
+    levels = (*range(LAST - 3, -1, -3), 0.0)
+    found = repeated([roots(n) for n in range(repetitions)], [*range(repetitions)], levels, chain)
+    assert {one.flown for one in found if one.probability} == {50 * len(levels)}
+    return np.array([one.probability for one in found])
+
+
+def test_a_rare_probability_is_found_without_bias():
+    """A plain study of as many runs would see the event once."""
+    p = of_many(40)
+    error = p.std(ddof=1) / math.sqrt(len(p))
+    assert abs(p.mean() - RARE) < 3.0 * error
+    assert error < 0.25 * RARE
+
+
+def test_intervals_cover():
+    found = [rare(some, np.zeros(10), 0.95) for some in of_many(2000).reshape(-1, 10)]
+    covered = [one.low <= RARE <= one.high for one in found]
+    assert 0.91 < np.mean(covered) < 0.985  # of 200
+
+
+def test_repetitions_are_what_each_is_alone():
+    levels = (14.0, 7.0, 0.0)
+    together = repeated([roots(n) for n in range(5)], [*range(5)], levels, chain)
+    alone = [repeated([roots(n)], [n], levels, chain)[0] for n in range(5)]
+    assert together == alone
+
+
+def test_weights_of_the_first_runs_count():
+    """Runs of odd seeds never turn before second 10, weigh 1/9 each, and are half of all."""
+
+    def flown(runs, of, levels):
+        said = chain(
+            runs, of, levels, lambda some: np.array([1.0 + 8.0 * (r.seed % 2 == 0) for r in some])
+        )
+        odd = np.array([run.seed % 2 == 1 for run in runs])
+        return Flown(np.where(odd, np.nan, said.reached_s), said.weights, said.errors)
+
+    found = repeated([roots(n) for n in range(60)], [*range(60)], (17.0, 14.0, 11.0), flown)
+    p = np.array([one.probability for one in found])
+    assert abs(p.mean() - 0.9 * STAYS**9) < 3.0 * p.std(ddof=1) / math.sqrt(len(p))
+
+
+def test_a_collapsed_repetition_is_none_that_is_dropped():
+    # A stage of a probability of 0.6^14 that hardly any of 50 runs passes.
+    found = repeated([roots(n) for n in range(60)], [*range(60)], (14.0, 0.0), chain)
+    collapsed = [one for one in found if one.probability == 0.0]
+    assert 20 < len(collapsed) < 60
+    assert all(
+        one.error is None and one.flown in (50, 100) and one.unseen > 0.0 for one in collapsed
+    )
+
+
+def test_the_interval_where_no_repetition_came_to_it():
+    """3.69 events are seen at least once with 97.5 %: so many times what one would have added."""
+    nothing = rare(np.zeros(10), np.full(10, 2e-6), 0.95)
+    assert (nothing.value, nothing.low) == (0.0, 0.0)
+    assert nothing.high == pytest.approx(-math.log(0.025) * 2e-6 / 10)
+    assert rare(np.zeros(10), np.full(10, 5.0), 0.95).high == 1.0
+
+
+def test_the_interval_of_a_skewed_mean_is_that_of_its_logarithm():
+    values = np.array([1e-6, 2e-6, 4e-6])
+    found = rare(values, np.zeros(3), 0.95)
+    half = 4.302652729911275 * values.std(ddof=1) / math.sqrt(3) / values.mean()
+    np.testing.assert_allclose([found.low, found.high], values.mean() * np.exp([-half, half]))
+
+
+def test_a_score_that_never_rises_is_said():
+    def stuck(runs, of, levels):
+        at = np.where(np.array(levels)[:, np.newaxis] >= 12.0, 3.0, np.nan)
+        return Flown(at.repeat(len(runs), axis=1), np.ones(len(runs)), [None] * len(runs))
+
+    with pytest.raises(
+        ValueError, match=r"the score never rises: of 50 runs of the pilot.* of 12 "
+    ):
+        find_levels(roots(0), 1, CANDIDATES, stuck)
+
+
+def test_a_run_that_fails_fails_its_repetition_alone():
+    def failing(runs, of, levels):
+        said = chain(runs, of, levels)
+        errors = ["radar failed" if run.seed == 1003 else None for run in runs]
+        return Flown(said.reached_s, said.weights, errors)
+
+    found = repeated([roots(n) for n in range(3)], [0, 1, 2], (14.0, 0.0), failing)
+    assert [one.error for one in found] == [None, "radar failed", None]
+    with pytest.raises(ValueError, match="of the pilot of splitting: radar failed"):
+        find_levels(roots(1), 1, CANDIDATES, failing)
+
+
+def test_branches_come_from_each_run_as_often_as_it_weighs():
+    weights = np.array([1.0, 2.0, 5.0, 2.0])
+    often = np.zeros(4)
+    for k in range(1000):
+        chosen = np.bincount(chosen_of(weights, 7, (k + 0.5) / 1000), minlength=4)
+        assert (np.abs(chosen - 0.7 * weights) < 1.0).all()
+        often += chosen
+    np.testing.assert_allclose(often / 1000, 0.7 * weights, rtol=2e-3)
+
+
+#: A radar sees an aircraft that comes head-on from 3 km on; every second a track is told, or lost.
+#: Only a turn that is told at one of the first 21 tracks keeps clear of an NMAC.
+LATE = """
+title = "a turn that comes late"
+duration_s = 36
+seed = 1
+wires = [
+  "traffic -> transform -> gate -> radar -> fusion -> tracker",
+  { from = "tracker", to = "avoidance", drop_probability = 0.5 },
+  { from = "avoidance", to = "traffic", delay_s = 1, holds = "nothing" },
+]
+[blocks.traffic]
+type = "traffic.scripted"
+ownship = { lat_deg = 52, lon_deg = 4, alt_m = 1000, speed_mps = 50 }
+[[blocks.traffic.intruders]]
+name = "ahead"
+east_m = 0
+north_m = 3300
+up_m = 0
+heading_deg = 180
+speed_mps = 50
+[blocks.transform]
+type = "geometry.ellipsoid"
+[blocks.gate]
+type = "gate"
+[blocks.radar]
+type = "radar.range_boundary"
+scan_rate_hz = 1
+range_km = 3
+azimuth_beamwidth_deg = 5.8
+elevation_beamwidth_deg = 5.8
+range_cell_m = 76.2
+[blocks.fusion]
+type = "fusion.pick_best"
+[blocks.tracker]
+type = "tracking.stub"
+[blocks.avoidance]
+type = "avoidance.turn_away"
+range_km = 5
+turn_deg = 90
+rate_deg_s = 6
+"""
+
+
+def study_of(folder, **keys):
+    """A study of it by splitting, ready to run."""
+    (folder / "late.toml").write_text(LATE)
+    tables = {
+        "scene": str(folder / "late.toml"), "metrics": ["well_clear"], "replicas": 4,
+        "splitting": {"event": "nmac", "runs": 10, "levels": [24, 20]},
+    } | keys  # fmt: skip
+    (folder / "study.toml").write_text(to_toml(tables))
+    return read_study(folder / "study.toml")
+
+
+def rows_of(study):
+    parts = [run_chunk(study, chunk).content for chunk in study.chunks(0, study.cells)]
+    return [row for part in parts for row in pq.read_table(pa.BufferReader(part)).to_pylist()]
+
+
+def test_repetitions_of_a_study_are_the_same_in_any_chunk(tmp_path):
+    rows = rows_of(study_of(tmp_path))
+    assert [row["replica"] for row in rows] == [0, 1, 2, 3]
+    assert {row["nmac.levels"] for row in rows} == {"24, 20"}
+    assert {row["nmac.collapsed"] for row in rows} <= {0.0, 1.0}
+    assert all((row["nmac"] == 0.0) == row["nmac.collapsed"] and not row["error"] for row in rows)
+    for chunk in (1, 3):
+        other = rows_of(study_of(tmp_path, runs_per_chunk=chunk))
+        assert [{**row, "command": 0} for row in other] == [{**row, "command": 0} for row in rows]
+
+
+def test_the_pilot_is_found_once_and_again_the_same(tmp_path):
+    table = {"splitting": {"event": "nmac", "runs": 40}, "replicas": 2, "runs_per_chunk": 1}
+    study = study_of(tmp_path, **table)
+    first, second = rows_of(study)
+    levels = [float(text) for text in first["nmac.levels"].split(", ")]
+    assert first["nmac.levels"] == second["nmac.levels"]
+    assert levels[0] < 28.0 and levels == sorted(levels, reverse=True) and levels[-1] > 5.0
+
+
+def test_a_probability_of_half_a_millionth_in_a_closed_loop(tmp_path):
+    levels = [*range(26, 7, -2)]
+    table = {"event": "nmac", "runs": 40, "levels": levels}
+    rows = rows_of(study_of(tmp_path, splitting=table, replicas=12))
+    found = rare(*(np.array([row[n] for row in rows]) for n in ("nmac", "nmac.unseen")), 0.95)
+    assert found.low < 0.5**21 < found.high
+    assert found.high < 5.0 * found.low
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"splitting": {"event": "nmca"}}, "splitting.event = 'nmca': is no event that well_clear "
+         "has a score of; did you mean 'nmac'?"),
+        ({"splitting": {"event": "nmac", "score": "tau"}}, "splitting.score = 'tau': is no score; "
+         "allowed: separation, time_to_go"),
+        ({"splitting": {"event": "nmac", "levels": [3, 5]}}, "splitting.levels = [3, 5]: must "
+         "fall, from far to near, for example [20, 12]"),
+        ({"splitting": {"event": "nmac", "score": "separation", "levels": [3, 0.5]}},
+         "splitting.levels = [3.0, 0.5]: must all be above 1, which is the event itself"),
+        ({"replicas": 1}, "replicas = 1: are the repetitions of splitting: its interval needs 2"),
+        ({"over": []}, "over: does not go with splitting"),
+        ({"metrics": ["well_clear", "closest_approach"]},
+         "metrics: splitting is for one event: leave the one metric that gives it"),
+        ({"metrics": ["closest_approach"]}, "splitting.event = 'nmac': the metric "
+         "closest_approach does not know how near a run comes"),
+        ({"metrics": [{"metric": "well_clear", "tau_s": 35}],
+          "splitting": {"event": "well_clear_lost"}}, "is no event that well_clear has a score of"),
+        ({"scene": str(Path("configs/first_light.toml").resolve())},
+         "splitting: the scene has no closed loop: nothing that is drawn changes a flight"),
+    ],
+)  # fmt: skip
+def test_what_makes_splitting_impossible_is_said_before_the_first_run(keys, said, tmp_path):
+    with pytest.raises(SceneError, match=re.escape(said)):
+        study_of(tmp_path, **keys)
+
+
+def test_a_block_that_cannot_be_flown_again_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("components.avoidance.TurnAway.needs_host", "is a host's")
+    with pytest.raises(SceneError, match="splitting: the block avoidance waits for a host program"):
+        study_of(tmp_path)
