@@ -35,7 +35,6 @@ LOOKS = (5 + 20 + 2) * _DURATION_S
 class Listening(ExtendedKalman):
     """A tracker that keeps what it is given."""
 
-    lockstep = True
     rewindable = False
     kept: list[Wake]
 

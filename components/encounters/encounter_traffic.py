@@ -212,6 +212,7 @@ class ModelParameters(OneEncounter):
 class _EncounterTraffic(RecordedTraffic):
     """One encounter; its first aircraft is the ownship."""
 
+    lockstep = True
     Parameters = OneEncounter
     encounter_set: EncounterSet
     index: int
@@ -271,14 +272,12 @@ class SetTraffic(_EncounterTraffic):
     """Traffic of one encounter of a set, by its number."""
 
     Parameters = SetParameters
-    lockstep = True
 
 
 class ModelTraffic(_EncounterTraffic):
     """Traffic of one encounter that a pair of encounter models makes, by its number."""
 
     Parameters = ModelParameters
-    lockstep = True
     verified = (
         Verified("sampled tracks", "exact distributions of the network, by enumeration",
                  "chi-square and 4 standard errors", "tests/encounters/test_sampling.py"),

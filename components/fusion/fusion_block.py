@@ -47,6 +47,7 @@ class Fusion(Component):
     outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
     also_records = (FusedWithPose,)
     windowed = True
+    lockstep = True
     rewindable = True
     verified = (
         Verified("where a fused row puts its target", "pymap3d, and rotations by matrices: a banked"

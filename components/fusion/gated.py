@@ -156,7 +156,6 @@ class Gated(Fusion):
     """
 
     Parameters = GatedParameters
-    lockstep = True
     ladders = (FUSION_LADDER,)
 
     def window_s(self) -> Any:

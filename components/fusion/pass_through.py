@@ -23,7 +23,6 @@ class PassThrough(Fusion):
     """
 
     Parameters = Parameters
-    lockstep = True
 
     def window_s(self) -> Any:
         """Return 0: nothing waits for anything."""

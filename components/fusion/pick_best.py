@@ -40,7 +40,6 @@ class PickBest(Fusion):
     """
 
     Parameters = PickBestParameters
-    lockstep = True
     ladders = (FUSION_LADDER,)
 
     def left_out(self) -> list[str]:

@@ -128,7 +128,6 @@ def _extinction_per_m(block: Any) -> float:
 class LaserExtinction(Effect[float]):
     """Haze, fog and rain take of the pulse both ways (Kruse's law with Kim's exponent)."""
 
-    lockstep = True
     name = "laser extinction"
     acts_on = EXTINCTION
     builds = _extinction_per_m
@@ -185,7 +184,6 @@ class ScanningLaser(SweepingSensor):
 
     mark = LASER
     measures_range = True
-    lockstep = True
     Parameters = LaserParameters
     inputs = CUED_INPUTS
     hooks = (EXTINCTION,)

@@ -49,7 +49,6 @@ class Limb(Effect[Hides]):
     name = "Earth's horizon"
     acts_on = HIDES
     outside_the_proof = "an Earth that hides nothing is none"
-    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[terrain] horizon``."""
@@ -71,7 +70,6 @@ class Mountains(Effect[Hides]):
     name = "masking by the ground"
     acts_on = HIDES
     outside_the_proof = "without a raster there is no ground"
-    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[terrain] raster``."""
@@ -103,7 +101,6 @@ class Refraction(Effect[Bends]):
     name = "refraction"
     acts_on = BENDS
     outside_the_proof = "angles are formed anew, and their last bits differ"
-    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[terrain] refraction``."""

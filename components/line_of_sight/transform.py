@@ -317,35 +317,30 @@ class FlatEarth(Transform):
     """Line of sight over a flat Earth with 111,195 m per degree (thesis eq. 1-5, corrected)."""
 
     earth = "flat_earth"
-    lockstep = True
 
 
 class LocalRadii(Transform):
     """Line of sight over a flat Earth with the ellipsoid's radii at the ownship."""
 
     earth = "local_radii"
-    lockstep = True
 
 
 class DaidalusSphere(Transform):
     """Line of sight in the plane in which the alerting logic of DO-365 compares aircraft."""
 
     earth = "daidalus_sphere"
-    lockstep = True
 
 
 class Geodesic(Transform):
     """Bearing and distance along the geodesic (GeographicLib), elevation from the heights."""
 
     earth = "geodesic"
-    lockstep = True
 
 
 class Ellipsoid(Transform):
     """Exact line of sight on the WGS-84 ellipsoid."""
 
     earth = "ellipsoid"
-    lockstep = True
     verified = (
         Verified("line of sight", "evaluation at 40 digits", "1e-12 m + 1e-13 of the range",
                  "tests/geometry/test_ellipsoid_exact.py"),

@@ -183,7 +183,6 @@ class NavigationErrors(_Navigation[Believing]):
     """What the ownship believes of its position and attitude: biases, and noise that lasts."""
 
     acts_on = OWNSHIP
-    lockstep = True
 
     def build(self, block: Any) -> Believing:
         """Return what gives the belief at each instant.
@@ -244,7 +243,6 @@ class NavigationReport(_Navigation[Reporting]):
     """The line of sight of every detection in the horizon's axes, as the ownship believes them."""
 
     acts_on = REPORT
-    lockstep = True
 
     def build(self, block: Any) -> Reporting:
         """Return what adds the columns to a report, and to its variances what navigation knows."""

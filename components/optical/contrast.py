@@ -101,7 +101,6 @@ CONTRAST = Hook("contrast", CellValues, "factor of each cell's contrast")
 class Background(Effect[CellValues]):
     """Contrast of the painted target against sky or ground under the scene's sun."""
 
-    lockstep = True
     name = "background and sun"
     acts_on = CONTRAST
     outside_the_proof = "no sun leaves every target's contrast exactly as it is"

@@ -231,7 +231,6 @@ class AddedFalseAlarms:
 class FrameFalseAlarms(Effect[Reporting]):
     """Noise that reaches the threshold, anywhere in the picture: Binomial(places, Pfa) a frame."""
 
-    lockstep = True
     name = "false alarms"
     acts_on = REPORT
     builds = AddedFalseAlarms

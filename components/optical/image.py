@@ -143,7 +143,6 @@ class ImageCamera(ElectroOptical):
     """
 
     Parameters = ImageParameters
-    lockstep = True
     ladders = (_LADDER,)
     _message = PictureDetections
 

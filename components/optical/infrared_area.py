@@ -108,7 +108,6 @@ AREA = Hook("area", CellValues, "area in m² to add to each cell's")
 class Plume(Effect[CellValues]):
     """Each aircraft's exhaust plume by its engine; those without one are not computed."""
 
-    lockstep = True
     name = "plume"
     acts_on = AREA
 

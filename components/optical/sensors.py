@@ -164,7 +164,6 @@ class ElectroOptical(Camera):
 
     mark = EO
     Parameters = ElectroOpticalParameters
-    lockstep = True
     areas, contrasts = "eo", "contrast"
     effects = (Background(), Night(), *Camera.effects)
     ladders = (VISIBLE,)
@@ -198,7 +197,6 @@ class Infrared(Camera):
 
     mark = IR
     Parameters = InfraredParameters
-    lockstep = True
     areas, contrasts = "ir", "contrast_ir"
     effects = (Plume(), BandExtinction(), *Camera.effects)
     ladders = (INFRARED,)
@@ -230,7 +228,6 @@ class Projection(Camera):
 
     mark = EO
     Parameters = ProjectionParameters
-    lockstep = True
     effects = (Night(), *Camera.effects)
     ladders = (VISIBLE,)
 
@@ -321,7 +318,6 @@ class OpticalRangeBoundary(Sensor):
     mark = EO
     Parameters = CameraBoundaryParameters
     inputs = CUED_INPUTS
-    lockstep = True
     ladders = (VISIBLE,)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:

@@ -220,7 +220,6 @@ class DynamicSignature(Effect[CellValues]):
 
     name = "dynamic signature"
     acts_on = SIGNATURE
-    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for the weight b."""

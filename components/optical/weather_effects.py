@@ -31,7 +31,6 @@ class Visibility(Effect[CellValues]):
     The visibility is the scene's own, or follows from its fog and rain.
     """
 
-    lockstep = True
     name = "visibility"
     acts_on = CONTRAST
 
@@ -69,7 +68,6 @@ class Visibility(Effect[CellValues]):
 class BandExtinction(Effect[CellValues]):
     """What clear air, haze, fog and rain take from an infrared band's contrast."""
 
-    lockstep = True
     name = "extinction in the band"
     acts_on = CONTRAST
 
@@ -104,7 +102,6 @@ DARKNESS = Hook("darkness", bool, "whether it is too dark to see anything")
 class Night(Effect[bool]):
     """Without daylight a camera for visible light sees nothing; lights are not simulated."""
 
-    lockstep = True
     name = "night"
     acts_on = DARKNESS
     outside_the_proof = "a camera in the dark is off"

@@ -185,7 +185,6 @@ class BeamShape(Effect[CellValues]):
     acts_on = BEAM_SHAPE
     flag = "beam_shape_loss"
     builds = OffAxis
-    lockstep = True
     outside_the_proof = "no target is amid every beam"
 
 
@@ -308,7 +307,6 @@ class BeamSweep(Effect[Reporting]):
     acts_on = REPORT
     flag = "beam_sweep"
     builds = Sweep
-    lockstep = True
     outside_the_proof = "it fills a column that is null without it"
 
 

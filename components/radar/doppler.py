@@ -221,7 +221,6 @@ def range_rates(cells: Cells, detected: IntArray) -> FloatArray:
 class RangeRate(Effect[RangeRates]):
     """Rate of the slant range between the two aircraft, as they fly."""
 
-    lockstep = True
     name = "range rate"
     acts_on = RANGE_RATE
     flag = "measures_range_rate"
@@ -341,7 +340,6 @@ class DopplerFilter(Effect[DopplerProcessing]):
     all around.
     """
 
-    lockstep = True
     name = "moving target filter"
     acts_on = DOPPLER
     builds = DopplerProcessing

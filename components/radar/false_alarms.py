@@ -123,7 +123,6 @@ class FalseAlarms(Effect[Reporting]):
     ``detection_probability`` is null for all (``looks`` has it).
     """
 
-    lockstep = True
     name = "false alarms"
     acts_on = REPORT
     builds = NoiseReports
@@ -314,7 +313,6 @@ class ClutterAlarms(Effect[Reporting]):
     sidelobes meet cross it in every cell.
     """
 
-    lockstep = True
     name = "clutter false alarms"
     acts_on = REPORT
     builds = GroundReports

@@ -240,7 +240,6 @@ class GroundClutter(Effect[Echo]):
     target's. What the threshold does there is said by ``clutter_threshold``.
     """
 
-    lockstep = True
     name = "ground clutter"
     acts_on = CLUTTER
 

@@ -206,7 +206,6 @@ class MeasuredStrength(Effect[Strengthening]):
     decided. Where the draw of a look decides, the same draw says how strong it came out.
     """
 
-    lockstep = True
     name = "measured strength"
     acts_on = STRENGTH
     builds = Strength
@@ -244,7 +243,6 @@ class OwnVelocity(Effect[Reporting]):
     A range rate is of two aircraft: an estimate of the other one's velocity from it needs ours.
     """
 
-    lockstep = True
     name = "own velocity"
     acts_on = REPORT
     flag = "measures_range_rate"

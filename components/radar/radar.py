@@ -184,7 +184,6 @@ class Radar(SweepingSensor):
 class LaterAcquisition(Effect[CellValues]):
     """Sees a target from where it is acquired on, as long as no scan misses it."""
 
-    lockstep = True
     name = "acquisition"
     acts_on = SNR
 
@@ -275,7 +274,6 @@ class RangeBoundary(Radar):
 
     Parameters = RangeBoundaryParameters
     inputs = CUED_INPUTS
-    lockstep = True
     boundary = True
     effects = (
         *WEATHER_EFFECTS,

@@ -160,7 +160,6 @@ class RainClutter(Effect[Echo]):
     fluctuates like noise from pulse to pulse. It moves with the wind and falls.
     """
 
-    lockstep = True
     name = "rain echo"
     acts_on = CLUTTER
 
@@ -239,7 +238,6 @@ class SidelobeClutter(Effect[Echo]):
     moving-target filter takes little of them.
     """
 
-    lockstep = True
     name = "sidelobe clutter"
     acts_on = CLUTTER
 

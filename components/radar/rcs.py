@@ -133,7 +133,6 @@ def _by_targets(context: Context, says: Callable[[Aircraft], str], *, otherwise:
 class RcsFluctuation(Effect[ModelsOfCells]):
     """Swerling fluctuation I to IV (thesis §4.1.2); without it every target is steady."""
 
-    lockstep = True
     name = "RCS fluctuation"
     acts_on = FLUCTUATION
 
@@ -155,7 +154,6 @@ class RcsFluctuation(Effect[ModelsOfCells]):
 class AspectRcs(Effect[CellValues]):
     """Mean RCS from a table over the direction from which the radar sees the aircraft."""
 
-    lockstep = True
     name = "aspect RCS"
     acts_on = MEAN_RCS
 
@@ -315,7 +313,6 @@ class LastingFluctuation(Effect[Fading]):
     An aspect table's mean is multiplied by it.
     """
 
-    lockstep = True
     name = "lasting fluctuation"
     acts_on = FADING
     outside_the_proof = "without it every scan draws a fade of its own"

@@ -220,7 +220,6 @@ class OneReportByCell(Effect[Merging]):
     cell with the probability of false alarm, however many faint targets it holds.
     """
 
-    lockstep = True
     name = "resolution cells"
     acts_on = ONE_REPORT
     builds = Merging

@@ -157,7 +157,6 @@ class SwerlingRadar(LinkBudgetRadar):
     """
 
     Parameters = SwerlingParameters
-    lockstep = True
     hooks = (FLUCTUATION, FADING, PD_METHOD)
     effects = (RcsFluctuation(), LastingFluctuation(), ExactDetection(), *LinkBudgetRadar.effects)
 

@@ -303,7 +303,6 @@ class ThresholdRadar(LinkBudgetRadar):
     """
 
     Parameters = ThresholdParameters
-    lockstep = True
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)

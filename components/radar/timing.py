@@ -307,7 +307,6 @@ class TimeBudget(Effect[LookEnergy]):
     instances of their own.
     """
 
-    lockstep = True
     name = "time budget"
     acts_on = LOOK_ENERGY
     outside_the_proof = "with it the link budget is that of another look"

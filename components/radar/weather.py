@@ -25,7 +25,6 @@ SNR = Hook("SNR", CellValues, "factor of each cell's SNR")
 class BlindRange(Effect[CellValues]):
     """No echo closer than ``minimum_range_m``: the receiver is shut while the pulse leaves."""
 
-    lockstep = True
     name = "blind range"
     acts_on = SNR
 
@@ -134,7 +133,6 @@ class Gas(Attenuation):
 
     name = "gas attenuation"
     key = "gas"
-    lockstep = True
 
     def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
         """Return gas only; with no gas called for, a table without it."""
@@ -197,7 +195,6 @@ class Rain(Attenuation):
 
     name = "rain"
     key = "rain_rate_mm_h"
-    lockstep = True
 
     def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
         """Return rain only."""
@@ -214,7 +211,6 @@ class Fog(Attenuation):
 
     name = "fog"
     key = "fog_water_g_m3"
-    lockstep = True
 
     def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
         """Return fog only."""

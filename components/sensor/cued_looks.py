@@ -135,7 +135,6 @@ CUE = Hook("cue", ConesAhead, "which targets lie in a cue cone at each scan")
 class CuedLooks(Effect[ConesAhead]):
     """Finds the targets that lie in cue cones at each scan, by where the ownship believes to be."""
 
-    lockstep = True
     name = "cues"
     acts_on = CUE
 

@@ -59,7 +59,6 @@ class DeclarationRule(Effect[Judging]):
 
     name = "declaration"
     acts_on = DECLARATION
-    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``declare_m`` and ``declare_n``."""
@@ -338,7 +337,6 @@ class DeclarationByPlace(Effect[Reporting]):
     name = "declaration by place"
     acts_on = REPORT
     builds = DeclaredPlaces
-    lockstep = True
     outside_the_proof = "without it whatever is reported is declared"
 
     def verdict(self, block: Any) -> Verdict:

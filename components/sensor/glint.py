@@ -127,7 +127,6 @@ class Glint(Effect[Wander]):
     from any side, at the range, or of the size, that it measures.
     """
 
-    lockstep = True
     name = "glint"
     acts_on = APPARENT_PLACE
     builds = Wander

@@ -216,7 +216,6 @@ MEASUREMENT = Hook("measurement", ErrorModel, "what is measured, and its varianc
 class MeasurementErrors(Effect[ErrorModel]):
     """Errors of azimuth, elevation, range and range rate, in the sensor's own axes."""
 
-    lockstep = True
     name = "measurement errors"
     acts_on = MEASUREMENT
     builds = ErrorModel

@@ -123,7 +123,6 @@ AXES = Hook("axes", SensorAxes, "the sensor's axes in the ownship's")
 class Mounting(Effect[SensorAxes]):
     """Boresight and roll of the sensor, and an error of them that is not known to the ownship."""
 
-    lockstep = True
     name = "mounting"
     acts_on = AXES
     outside_the_proof = "rotating by an angle of 0 and back rounds the last bits"

@@ -131,6 +131,7 @@ class Sensor(Measuring):
     )  # fmt: skip
     also_records: ClassVar[tuple[type[Message], ...]] = (EveryLook,)
     windowed = True
+    lockstep = True
     rewindable = True
     hooks: ClassVar[tuple[Hook[Any], ...]] = (
         CUE, AXES, APPARENT_PLACE, STRENGTH, MEASUREMENT, DECLARATION, REPORT,

@@ -25,8 +25,6 @@ class ExtendedKalman(Tracker):
     line of sight is no longer small beside the range it is too sure of itself.
     """
 
-    lockstep = True
-
 
 class UnscentedParameters(TrackerParameters):
     """Parameters of the unscented tracker."""
@@ -42,7 +40,6 @@ class Unscented(Tracker):
     """Takes the moments of measurements from sigma points instead of linearising."""
 
     Parameters = UnscentedParameters
-    lockstep = True
 
     def estimator(self) -> UnscentedKalmanFilter:
         """Return an unscented filter of nearly constant velocity."""
@@ -119,7 +116,6 @@ class InteractingModels(Tracker):
     """Runs several extended Kalman filters that share what they know by the models' odds."""
 
     Parameters = InteractingParameters
-    lockstep = True
 
     def estimator(self) -> InteractingMultipleModels:
         """Return a filter for each model."""

@@ -55,7 +55,6 @@ class CrabAngles(Effect[Crabbing]):
     name = "wind"
     acts_on = ATTITUDE
     outside_the_proof = "angles are formed anew, and their last bits differ"
-    lockstep = True
 
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather] wind_mps``."""

@@ -206,7 +206,6 @@ class Lookout(Sensor):
 
     mark = EYES
     Parameters = LookoutParameters
-    lockstep = True
     hooks = (DARKNESS,)
     effects: ClassVar[tuple[Effect, ...]] = (Night(),)
     ladders = (BETWEEN_SCANS,)

@@ -190,7 +190,8 @@ class Component:
     #: Whether one instance may serve many runs in lock step: its `run` treats every row by itself,
     #: draws by `Stream.of_runs`, and remembers each run (`Wake.run`) apart from the others: the
     #: next wake comes back to each but those before its `Wake.first_run`. A class says so of its
-    #: own code only: a subclass that does not say it again gets an instance for each run.
+    #: own code and of the effects that it lists, and of the classes of its package that derive
+    #: from it: one of another package that does not say it again gets an instance for each run.
     lockstep: ClassVar[bool] = False
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
@@ -216,7 +217,8 @@ class Component:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        cls.lockstep = vars(cls).get("lockstep", False)
+        if "lockstep" not in vars(cls) and not _says_so(cls):
+            cls.lockstep = False
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
         self.name = name
@@ -357,10 +359,8 @@ class Component:
         return one
 
     def serves_replicas(self) -> bool:
-        """Return whether this block, with the effects built, may serve replicas in lock step."""
-        return type(self).lockstep and all(
-            effect.lockstep for effect in type(self).effects if effect.name in self.context.effects
-        )
+        """Return whether this block may serve replicas in lock step."""
+        return type(self).lockstep
 
     def together(
         self, parameters: Sequence[Any], make: Callable[[int], "Component"]
@@ -383,6 +383,13 @@ class Component:
     def path(cls) -> str:
         """Return ``module:Class``."""
         return f"{cls.__module__}:{cls.__qualname__}"
+
+
+def _says_so(cls: type[Component]) -> bool:
+    """Whether the base that last said `Component.lockstep` speaks for a class of its package."""
+    base = next(base for base in cls.__mro__ if "lockstep" in vars(base))
+    same = base.__module__.partition(".")[0] == cls.__module__.partition(".")[0]
+    return same and bool(vars(base)["lockstep"])
 
 
 @dataclass(eq=False)

@@ -76,7 +76,11 @@ class Verdict:
 
 
 class Effect(Generic[Built]):
-    """One effect of a block type; stateless, shared by all blocks of that type."""
+    """One effect of a block type; stateless, shared by all blocks of that type.
+
+    Whether what it builds may get rows of several runs in one call is said by the block that lists
+    it (`Component.lockstep`).
+    """
 
     #: What it is called.
     name: ClassVar[str]
@@ -87,9 +91,6 @@ class Effect(Generic[Built]):
     neutral: ClassVar[bool] = True
     #: Why nothing can be built that changes no bit.
     outside_the_proof: ClassVar[str] = ""
-    #: Whether what it builds treats every row by itself (and draws by scan number), so that rows
-    #: of different replicas may come in one call. A subclass says it again for itself.
-    lockstep: ClassVar[bool] = False
 
     #: Parameter of the block that is true where the effect is asked for, if that is all.
     flag: ClassVar[str] = ""
@@ -98,7 +99,6 @@ class Effect(Generic[Built]):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        cls.lockstep = vars(cls).get("lockstep", False)
         if cls.outside_the_proof:
             cls.neutral = False
 

@@ -11,6 +11,7 @@ from components.radar.weather import Rain
 from components.tracking.stub import TrackerStub
 from dsa_des.arrays.run_ticks import no_runs
 from dsa_des.block.component import Component, Input
+from dsa_des.block.entry_points import registered
 from dsa_des.errors import BlockFailure
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step
@@ -60,13 +61,12 @@ class TiringRadar(SwerlingRadar):
 
 
 class MyRain(Rain):
-    """Says nothing of replicas, so what it builds serves one."""
+    """Knows nothing of replicas."""
 
 
 class WetRadar(SwerlingRadar):
-    """Says that it serves all, but one of its effects does not."""
+    """Lists an effect of its own, and says nothing of replicas."""
 
-    lockstep = True
     effects = tuple(MyRain() if type(e) is Rain else e for e in SwerlingRadar.effects)
 
 
@@ -165,10 +165,30 @@ def test_one_that_serves_all_says_of_which_run_its_rows_are(tmp_path):
 
 
 def test_a_subclass_says_for_itself_that_it_serves_all_replicas():
-    for base in (TrackerStub, Rain):
-        assert base.lockstep
-        assert not type("Silent", (base,), {}).lockstep
-        assert type("Outspoken", (base,), {"lockstep": True}).lockstep
+    assert TrackerStub.lockstep
+    assert not type("Silent", (TrackerStub,), {}).lockstep
+    outspoken = type("Outspoken", (TrackerStub,), {"lockstep": True})
+    assert outspoken.lockstep
+
+
+def test_a_class_speaks_for_those_of_its_package():
+    def derived(base, module, **says):
+        return type("Derived", (base,), {"__module__": module, **says})
+
+    assert derived(TrackerStub, "components.tracking.other").lockstep
+    assert not derived(TrackerStub, "components_of_mine.other").lockstep
+    mine = derived(TrackerStub, "mine.trackers", lockstep=True)
+    assert derived(mine, "mine.more").lockstep
+    assert not derived(mine, "components.tracking.other").lockstep
+    silent = derived(TrackerStub, "components.tracking.other", lockstep=False)
+    assert not derived(silent, "components.tracking.more").lockstep
+
+
+def test_no_block_repeats_what_its_base_says_of_replicas():
+    for point in registered().values():
+        for cls in point.load().__mro__:
+            said = [vars(base)["lockstep"] for base in cls.__mro__ if "lockstep" in vars(base)]
+            assert said[:2] != [True, True] or not cls.__module__.startswith("components"), cls
 
 
 class DrawsOnce(TrackerStub):

@@ -278,7 +278,6 @@ class CellAveraging(Effect[Averaging]):
     a target needs the CFAR loss more SNR. A calibrated range is that of a threshold known exactly.
     """
 
-    lockstep = True
     name = "CFAR"
     acts_on = REFERENCE_CELLS
     builds = Averaging

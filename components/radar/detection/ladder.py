@@ -135,7 +135,6 @@ PD_METHOD = Hook("method of Pd", str, "name of what gives the probability of det
 class ExactDetection(Effect[str]):
     """The exact Pd; where ``[accuracy]`` allows its error, a table is looked up instead."""
 
-    lockstep = True
     name = "exact Pd"
     acts_on = PD_METHOD
     outside_the_proof = "it is a choice between two methods, of which one is always in use"
