@@ -232,9 +232,12 @@ class AnswerReport:
         return f"{self._cost(verdict.model):.2g}, at most {_plain(max(mine))} {unit}".rstrip()
 
     def _of_kind(self, some: Sequence[ModelVerdict], kind: str, words: str, text: Any) -> list[str]:
-        mine = [verdict for verdict in some if verdict.kind == kind]
-        named = "; ".join(f"{verdict.model} ({text(verdict)})" for verdict in mine)
-        return [f"{words} {named}."] if mine else []
+        models: dict[str, list[str]] = {}
+        for verdict in some:
+            if verdict.kind == kind:
+                models.setdefault(text(verdict), []).append(verdict.model)
+        named = "; ".join(f"{', '.join(those)} ({said})" for said, those in models.items())
+        return [f"{words} {named}."] if models else []
 
     def _beyond_text(self, verdict: ModelVerdict) -> str:
         change = verdict.change
