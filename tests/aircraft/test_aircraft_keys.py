@@ -130,7 +130,7 @@ def a_model_that_gives_the_two(monkeypatch):
     """What a model makes cannot be put at one place: here it gives what stands in its file."""
     monkeypatch.setattr(
         "components.encounters.encounter_traffic._PAIRS",
-        MadeTogether(lambda keys: [read_set(model[0]) for model, _ in keys]),
+        MadeTogether(lambda keys: [(read_set(model.file), number) for model, number in keys]),
     )
 
 
