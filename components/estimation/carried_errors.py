@@ -20,7 +20,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from components.estimation.batched import product, product_transposed, symmetric, times
+from components.estimation.batched import (
+    product,
+    product_transposed,
+    squared_length,
+    symmetric,
+    times,
+)
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected, linearised
@@ -33,6 +39,8 @@ from dsa_des.arrays.types import BoolArray, FloatArray
 NORTH, EAST, HEIGHT, SPEED_NORTH, SPEED_EAST, CLIMB, BEARING, RANGE, LATENCY = range(9)
 # Position and velocity.
 _MOVING = 6
+# Up to this share of it a late position is as late as before.
+_SAME_WAY = 0.1
 # Steeper than this (as a share of the range) a bearing is none.
 _LEVEL = 1e-3
 
@@ -103,13 +111,36 @@ class ReportedErrors:
     age_s: FloatArray  # (n,), for how long positions were carried on by the reported velocity
     # (n,), whether a height leaves the range as it is: measured ranges with a reported height
     at_range: BoolArray
+    # (3, n) or None: How far ahead of a late position a target is, by what its track has of that
+    # already, m; NaN where nothing is known but its speed
+    ahead_m: FloatArray | None = None
 
     def repeated(self, times: int) -> "ReportedErrors":
         """Return them so many times, one after the other."""
         return ReportedErrors(
             self.ways, np.tile(self.deviation, times), np.tile(self.age_s, times),
             np.tile(self.at_range, times),
+            None if self.ahead_m is None else np.tile(self.ahead_m, times),
         )  # fmt: skip
+
+    def reported_by(self, covariance: FloatArray, velocity: FloatArray) -> "ReportedErrors":
+        """Return them for tracks with some covariances, as far as they were reported by these.
+
+        Later reports are late by the same: they tell nothing of it. The speed is known ever better
+        and the way by which they are late with it, which would seem to tell; so they are as late
+        as the track says, unless it has turned since, or others saw it.
+        """
+        if LATENCY not in self.ways:
+            return self
+        i = self.ways.index(LATENCY)
+        ahead, way = covariance[:3, _MOVING + i], self.deviation[i] * velocity
+        off = np.sqrt(squared_length(ahead - way)) > _SAME_WAY * np.sqrt(squared_length(way))
+        return replace(self, ahead_m=np.where(off, np.nan, ahead))
+
+    def _late_m(self, state: FloatArray, deviation: FloatArray) -> FloatArray:
+        """Return how far ahead of late positions targets are that are late by one deviation."""
+        way = deviation * state[3:_MOVING]
+        return way if self.ahead_m is None else np.where(np.isnan(self.ahead_m), way, self.ahead_m)
 
     @property
     def considered(self) -> BoolArray | None:
@@ -166,7 +197,8 @@ class ReportedErrors:
         reported[4] += self._sum(state, SPEED_EAST)
         reported[5] -= self._sum(state, CLIMB)
         if LATENCY in self.ways:
-            reported[:3] -= self._sum(state, LATENCY) * state[3:_MOVING]
+            i = self.ways.index(LATENCY)
+            reported[:3] -= state[_MOVING + i] * self._late_m(state, self.deviation[i])
         height = self._sum(state, HEIGHT)
         reported[0] += self._sum(state, NORTH) + self.age_s * (reported[3] - state[3])
         reported[1] += self._sum(state, EAST) + self.age_s * (reported[4] - state[4])
@@ -215,7 +247,7 @@ class ReportedErrors:
             elif way == CLIMB:
                 result[5, i], result[2, i] = -deviation, -deviation * self.age_s
             elif way == LATENCY:
-                result[:3, i] = -deviation * state[3:_MOVING]
+                result[:3, i] = -self._late_m(state, deviation)
             elif way == HEIGHT:
                 outward = np.where(self.at_range, -up / level, 0.0)
                 result[0, i], result[1, i] = deviation * outward * cos, deviation * outward * sin
@@ -237,53 +269,54 @@ class Ages:
     since: FloatArray  # Since the track was last updated: what was new before is in its state
     late: FloatArray  # How much older a position is than it was carried on for
 
-    def errors(self, model: Motion, velocity_variance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def errors(
+        self, model: Motion, state: FloatArray, velocity_variance: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Return covariances of reported position and velocity, and of the state with it.
 
-        Both are (6, 6, n), in m and m/s; of the second one rows are the state's.
+        They are (6, 6, n) and (d, 6, n), in m and m/s. What was reported of then is what the
+        motion back from now says, less what noise has changed since, seen back from now.
         `velocity_variance` (3, n) is the state's: a late position errs by it too, by the product
         of two errors, which no derivative has. The one that an aircraft always has makes it go
         with the velocity's, so it counts as two deviations.
         """
-        own = model.model if isinstance(model, MotionWithErrors) else model
         carried, now, age = self.position, self.velocity, self.position + self.late
-        both = np.minimum(age, now)
-        then, reported, common = (own.noise(t) for t in (age, now, both))
-        held, gained = (own.noise(np.minimum(self.since, t)) for t in (age, now))
-        error, shared = np.zeros((6, 6, len(age))), np.zeros((6, 6, len(age)))
+        place, speed = model.jacobian(state, -age)[:3], model.jacobian(state, -now)[3:_MOVING]
+        by_speed = product_transposed(product(speed, model.noise(now)), speed)
+        both = product_transposed(product(place, model.noise(np.minimum(age, now))), speed)
+        error = np.empty((_MOVING, _MOVING, len(age)))
+        error[:3, :3] = product_transposed(product(place, model.noise(age)), place)
+        error[:3, :3] += carried * (both + both.swapaxes(0, 1)) + carried**2 * by_speed
         for i in range(3):
-            v = i + 3
-            together = age * common[v, v] - common[i, v]
-            error[i, i] = then[i, i] - 2.0 * carried * together + carried**2 * reported[v, v]
             error[i, i] += (2.0 * self.late) ** 2 * velocity_variance[i]
-            error[i, v] = carried * reported[v, v] - together
-            error[v, i], error[v, v] = error[i, v], reported[v, v]
-            shared[i, i] = age * held[i, v] - held[i, i] - carried * gained[i, v]
-            shared[v, i] = age * held[v, v] - held[i, v] - carried * gained[v, v]
-            shared[i, v], shared[v, v] = -gained[i, v], -gained[v, v]
-        return error, shared
+        error[:3, 3:] = both + carried * by_speed
+        error[3:, :3], error[3:, 3:] = error[:3, 3:].swapaxes(0, 1), by_speed
+        shared = np.empty((len(state), _MOVING, len(age)))
+        shared[:, 3:] = -product_transposed(model.noise(np.minimum(self.since, now)), speed)
+        shared[:, :3] = -product_transposed(model.noise(np.minimum(self.since, age)), place)
+        shared[:, :3] += carried * shared[:, 3:]
+        return symmetric(error), shared
 
     def added(
         self, moments: Moments, model: Motion, state: FloatArray, covariance: FloatArray
     ) -> Moments:
         """Return what is expected of measurements, with what ages add to it."""
         own = model.model if isinstance(model, MotionWithErrors) else model
+        slope = np.ascontiguousarray(moments.jacobian[:, :_MOVING])
         if not isinstance(own, ConstantVelocity):
             moments = self._turned_back(moments, model, state, covariance)
-        error, shared = self.errors(model, np.stack([covariance[i, i] for i in (3, 4, 5)]))
-        slope = np.ascontiguousarray(moments.jacobian[:, :6])
-        known = slope.shape[1]
+        speeds = np.stack([covariance[i, i] for i in (3, 4, 5)])
+        error, shared = self.errors(model, state, speeds)
+        known, seen = slope.shape[1], moments.jacobian.shape[1]
         new = product_transposed(product(slope, error[:known, :known]), slope)
-        with_state = product_transposed(shared[:, :known], slope)  # (6, m, n)
-        both = product(slope, with_state[:known])
-        cross = moments.cross.copy()
-        cross[:6] += with_state
+        with_state = product_transposed(shared[:, :known], slope)  # (d, m, n)
+        both = product(moments.jacobian, with_state[:seen])
         own_error = new + both.swapaxes(0, 1)
         left_over = moments.left_over
         return replace(
-            moments, total=moments.total + own_error + both, cross=cross,
+            moments, total=moments.total + own_error + both, cross=moments.cross + with_state,
             left_over=own_error if left_over is None else left_over + own_error,
-            shared=with_state.swapaxes(0, 1),
+            shared=with_state[:seen].swapaxes(0, 1),
         )  # fmt: skip
 
     def _turned_back(

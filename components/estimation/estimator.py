@@ -113,6 +113,11 @@ class Estimator(Protocol):
         """How many errors of measurements a track's state carries, behind its velocity."""
         return 0
 
+    @property
+    def linear(self) -> "Estimator":
+        """The filter for tracks on arcs, whose Gaussian is no ellipse: by slopes where they are."""
+        return self
+
     def carrying(self, lasts_s: tuple[float, ...]) -> "Estimator":
         """Return the filter with errors that last so long as states; itself if it carries none."""
         return self

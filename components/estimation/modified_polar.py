@@ -51,7 +51,7 @@ def turned_about_vertical(
     sensor_m: FloatArray,
     sensor_m_s: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a correction by a coarse bearing as one of bearing, distance on the ground and height.
+    """Return a correction of a coarse bearing as one of bearing, distance on the ground and height.
 
     Where range and height are known far better than the bearing, what is known of a target lies on
     an arc about the vertical through the sensor, and of its motion past the sensor along and across

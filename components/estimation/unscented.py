@@ -16,7 +16,7 @@ from components.estimation.batched import (
     symmetric,
 )
 from components.estimation.carried_errors import ReportedErrors
-from components.estimation.estimator import Estimates, SingleModelFilter
+from components.estimation.estimator import Estimates, ExtendedKalmanFilter, SingleModelFilter
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected, residual
@@ -59,6 +59,11 @@ class UnscentedKalmanFilter(SingleModelFilter):
     """Takes the moments of motion and measurement from sigma points."""
 
     sigma: SigmaPoints = SigmaPoints()
+
+    @property
+    def linear(self) -> ExtendedKalmanFilter:
+        """Sigma points lie along straight axes, which leave an arc."""
+        return ExtendedKalmanFilter(self.model)
 
     def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
         """Return tracks after times (n,)."""

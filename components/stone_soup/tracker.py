@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
-from itertools import groupby
+from fractions import Fraction
 from typing import Annotated, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from components.messages.state_tracks import COASTED, CONFIRMED, COVARIANCE, DEL
 from components.sensor.marks import TRACKER
 from components.stone_soup.library import Repeatable, needs_stone_soup
 from components.tracking.out_of_sequence import LookCount, latest_s
+from components.tracking.promises import ACTS_EVERY_S, Promises
 from components.tracking.reported_errors import unknown_latency
 from components.tracking.scans import Scans, scans_of, when_made
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -79,6 +80,10 @@ class Follower:
         for name, one in self._tracks.items():
             self._follow(one, alive[name], seconds, mask_of)
         return sorted([*gone, *self._tracks.values()], key=lambda one: one.number)
+
+    def __bool__(self) -> bool:
+        """Return whether there are tracks."""
+        return bool(self._tracks)
 
     def _place(self, track: Any) -> tuple[float, ...]:
         """Return what orders tracks that appear at the same time: where they are."""
@@ -188,7 +193,9 @@ class StoneSoupTracker(Component):
     Stone Soup's have. Every sensor's look is handed over by itself, in the order of instants; with
     `fusion.pass_through` also those in vain. A look waits for as long as a scene says that an older
     one may still come; one that comes later all the same is left out and counted. Tracks that a
-    tracker shows count as confirmed, after a look in vain as coasted.
+    tracker shows count as confirmed, after a look in vain as coasted. Where nothing has come for as
+    long as no sensor is silent that still sees something (6 s, or three times as long as the
+    soonest promises a report in), the tracker gets looks in vain, so that its own rules end tracks.
     """
 
     mark = TRACKER
@@ -202,11 +209,17 @@ class StoneSoupTracker(Component):
         needs_stone_soup("tracking.stonesoup")
         self._ahead: Scans | None = None
         self._origin: FloatArray | None = None
-        self._newest = -1
+        self._own_m = np.zeros(3)
+        self._sensors: tuple[str, ...] = ()
+        # When the last look was made, and what was handed over last.
+        self._looked_tick = self._newest = -1
         self._count = LookCount()
         producers = self.context.producers
-        wait_s = latest_s(sensor_offers(producers), producers)
-        self._wait_ticks = int(wait_s * self.context.ticks_per_s)
+        offers, ticks_per_s = sensor_offers(producers), self.context.ticks_per_s
+        self._wait_ticks = int(latest_s(offers, producers) * ticks_per_s)
+        promises = Promises.of(offers, tuple(offers), ticks_per_s)
+        everywhere = np.full(1, np.inf)
+        (self._quiet_ticks,) = promises.life_ticks(np.ones((len(offers), 1), bool), everywhere)
         self._masks: dict[str, int] = {}
         self._follower = Follower(self.p.position_mapping, self.p.velocity_mapping)
         self._repeatable = Repeatable(
@@ -252,79 +265,102 @@ class StoneSoupTracker(Component):
             )
         return tracker
 
+    def acts_every_s(self) -> Fraction | None:
+        """Return how often silence is looked for, s."""
+        return ACTS_EVERY_S
+
     def run(self, wake: Wake) -> StateTracks | None:
-        """Hand over what came, look by look, and report all tracks."""
-        fused = wake["fused"]
-        if fused is None:
-            return None
-        scans, self._ahead = when_made(scans_of(fused), self._ahead, wake, self._wait_ticks)
-        if len(scans) == 0:
-            return None
-        if self._origin is None:
-            self._origin = scans.pose[:3, 0].copy()
-        origin = np.repeat(self._origin[:, np.newaxis], len(scans), axis=1)
-        poses = pose_in_frame(origin, scans.pose[:3], scans.pose[3:])
-        followed: list[tuple[int, int, Followed]] = []
+        """Hand over what came, look by look, and what did not; report all tracks."""
+        due = self._due(wake)
+        entries: list[tuple[int, FloatArray, Followed]] = []
         rows: list[int] = []
-        for row, looks in _by_row(self._in_time(scans, fused.sensors), scans.row):
+        for row, tick in enumerate(wake.ticks.tolist()):
             here: dict[int, Followed] = {}
-            for look in looks:
-                here |= {one.number: one for one in self._looked(fused, scans, look, poses, wake)}
-            rows.append(row)
-            followed += [(row, looks[-1], replace(one)) for one in here.values()]
-        if not rows:
-            return None
-        return self._message(wake, fused.sensors, rows, followed, poses)
+            in_time = False
+            for look, pose in due.get(row, ()):
+                if look.tick[0] < self._newest:
+                    self._count = self._count.of(self._sensors, look, slice(0), [0])
+                    continue
+                in_time = True
+                here |= {one.number: one for one in self._looked(look, pose, wake)}
+            if not in_time and self._is_silent(tick):
+                ended = self._handed_over(tick - self._wait_ticks, wake, set())
+                if any(one.status == DELETED for one in ended):
+                    here, in_time = {one.number: one for one in ended}, True
+            if in_time:
+                rows.append(row)
+                entries += [(row, self._own_m, replace(one)) for one in here.values()]
+        return self._message(wake, rows, entries) if rows else None
 
-    def _in_time(self, scans: Scans, sensors: tuple[str, ...]) -> list[int]:
-        """Return the looks that come after no later one; the others are counted."""
-        newest = np.maximum.accumulate(np.append(self._newest, scans.tick))
-        in_time = scans.tick >= newest[:-1]
-        self._newest = int(newest[-1])
-        self._count = self._count.of(sensors, scans, slice(None), np.flatnonzero(~in_time))
-        return np.flatnonzero(in_time).tolist()
+    def _due(self, wake: Wake) -> dict[int, list[tuple[Scans, SensorPose]]]:
+        """Return the looks that are handed over at rows of a wake, in order, with their poses."""
+        busy = wake.without_idle()
+        fused = None if busy is None else busy["fused"]
+        if fused is not None:
+            self._sensors = fused.sensors
+            came = scans_of(fused)
+            came = replace(came, row=np.flatnonzero(~wake.idle)[came.row])
+            self._count = self._count.of(fused.sensors, came, slice(None), [])
+        elif self._ahead is not None:
+            came = self._ahead.take(np.zeros(0, dtype=np.int64))
+        else:
+            return {}
+        scans, self._ahead = when_made(came, self._ahead, wake, self._wait_ticks)
+        due: dict[int, list[tuple[Scans, SensorPose]]] = {}
+        if len(scans):
+            if self._origin is None:
+                self._origin = scans.pose[:3, 0].copy()
+            origin = np.repeat(self._origin[:, np.newaxis], len(scans), axis=1)
+            poses = pose_in_frame(origin, scans.pose[:3], scans.pose[3:])
+            for i, row in enumerate(scans.row.tolist()):
+                one = np.array([i])
+                due.setdefault(row, []).append((scans.take(one), poses.take(one)))
+        return due
 
-    def _looked(
-        self, fused: FusedDetections, scans: Scans, look: int, poses: SensorPose, wake: Wake
-    ) -> "list[Followed]":
+    def _is_silent(self, tick: int) -> bool:
+        """Return whether nothing has come for so long that tracks may have to end."""
+        quiet = tick - self._wait_ticks - self._looked_tick
+        return bool(self._follower) and self._ahead is None and quiet >= self._quiet_ticks
+
+    def _looked(self, look: Scans, pose: SensorPose, wake: Wake) -> "list[Followed]":
         """Hand one look over, and return the tracks after it."""
         from components.stone_soup.objects import Poses, detections, instant
 
-        time_s = int(scans.tick[look]) / wake.ticks_per_s
-        when = instant(time_s)
-        which = slice(int(scans.offsets[look]), int(scans.offsets[look + 1]))
-        masks = [int(mask) for mask in scans.contributors[which]]
-        names = ["+".join(n for i, n in enumerate(fused.sensors) if m >> i & 1) for m in masks]
-        models = Poses(
-            poses.take(np.array([look])), self.p.position_mapping, self.p.state_size
-        )  # fmt: skip
+        (tick,) = look.tick.tolist()
+        masks = look.contributors.tolist()
+        names = ["+".join(n for i, n in enumerate(self._sensors) if m >> i & 1) for m in masks]
         result = detections(
-            models, [0] * len(masks), when, scans.measured[:, which], scans.variance[:, which],
+            Poses(pose, self.p.position_mapping, self.p.state_size), [0] * len(masks),
+            instant(tick / wake.ticks_per_s), look.measured, look.variance,
             [{"sensor": name} for name in names],
         )  # fmt: skip
+        self._masks.update(zip(names, masks, strict=True))
+        self._looked_tick, self._own_m = tick, pose.position_m[:, 0]
+        return self._handed_over(tick, wake, result)
+
+    def _handed_over(self, tick: int, wake: Wake, found: "set[Any]") -> "list[Followed]":
+        """Hand over what was detected at an instant, and return the tracks after it."""
+        from components.stone_soup.objects import instant
+
+        time_s = tick / wake.ticks_per_s
+        when, self._newest = instant(time_s), tick
         with self._repeatable.working():
-            _, tracks = self._tracker.update_tracker(when, result)
-            self._masks.update(zip(names, masks, strict=True))
+            _, tracks = self._tracker.update_tracker(when, found)
             return self._follower.after(tracks, time_s, when, self._masks)
 
     def _message(
-        self,
-        wake: Wake,
-        sensors: tuple[str, ...],
-        rows: list[int],
-        entries: "list[tuple[int, int, Followed]]",
-        poses: SensorPose,
+        self, wake: Wake, rows: list[int], entries: "list[tuple[int, FloatArray, Followed]]"
     ) -> StateTracks:
-        """Return tracks as a message: of each its row, the last look and its report."""
+        """Return tracks as a message: of each its row, where the ownship was, and its report."""
         tracks = [one for _, _, one in entries]
         count = len(tracks)
-        look = np.array([last for _, last, _ in entries], dtype=np.int64)
+        own_m = np.array([own for _, own, _ in entries]).reshape(count, 3).T
         of_row = np.searchsorted(rows, np.array([row for row, _, _ in entries], dtype=np.int64))
         state = np.array([one.state for one in tracks], dtype=float).reshape(count, 6).T
         spread = np.array([one.covariance for one in tracks], dtype=float).reshape(count, 6, 6)
         spread = np.moveaxis(spread, 0, -1)
         at = SensorPose(
-            poses.position_m[:, look],
+            own_m,
             np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2),
         )
         seen, by_state = linearised(Kind(False), state, at)
@@ -358,7 +394,7 @@ class StoneSoupTracker(Component):
             has_range=ranged,
             covariance={name: known(spread[index]) for index, name in COVARIANCE.items()},
             extras={},
-            sensors=sensors,
+            sensors=self._sensors,
             **moments,
         )  # fmt: skip
 
@@ -369,8 +405,3 @@ class StoneSoupTracker(Component):
     def report(self) -> dict[str, Any]:
         """Return whose looks came too late."""
         return {"late_looks": {self.name: self._count.late()}}
-
-
-def _by_row(looks: list[int], row: IntArray) -> list[tuple[int, list[int]]]:
-    """Return looks by the row of the wake that brings them, in their order."""
-    return [(key, list(mine)) for key, mine in groupby(looks, key=lambda look: int(row[look]))]

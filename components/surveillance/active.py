@@ -50,7 +50,12 @@ from components.surveillance.interrogation import (
     sine_of_elevation,
 )
 from components.surveillance.reports import unreported
-from components.surveillance.stated_errors import ALTIMETER, ROUNDING, unstated_errors
+from components.surveillance.stated_errors import (
+    ALTIMETER,
+    ROUNDING,
+    unstated_errors,
+    variances_of_replies,
+)
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.time.clock import NANOSECONDS
@@ -85,19 +90,13 @@ class ActiveParameters(CooperativeParameters):
         "of 0.1 s.",
     )
     mode_s_in_1_s: float = Field(
-        default=IN_1_S[0],
-        gt=0,
-        lt=1,
+        default=IN_1_S[0], gt=0, lt=1, json_schema_extra={"unit": ""},
         description="Probability of a Mode S answer within 1 s.",
-        json_schema_extra={"unit": ""},
-    )
+    )  # fmt: skip
     mode_c_in_1_s: float = Field(
-        default=IN_1_S[1],
-        gt=0,
-        lt=1,
+        default=IN_1_S[1], gt=0, lt=1, json_schema_extra={"unit": ""},
         description="Probability of a Mode C answer within 1 s.",
-        json_schema_extra={"unit": ""},
-    )
+    )  # fmt: skip
     measurement: Literal["exact", "do_365"] = Field(
         default="do_365",
         description="Errors of range, bearing and reported altitude: none, or those of DO-365.",
@@ -106,11 +105,10 @@ class ActiveParameters(CooperativeParameters):
         default=25, description="Step of altitudes that Mode S reports, ft; Mode C has 100."
     )
     near_s: float = Field(
-        default=60.0,
-        ge=0,
+        default=60.0, ge=0,
         description="Aircraft that would be met within this time, by measured ranges, and new "
         "ones are interrogated at every scan, s.",
-    )
+    )  # fmt: skip
     far_every: int = Field(
         default=5, ge=1, le=1000, description="Of others, one scan in so many asks each."
     )
@@ -195,6 +193,7 @@ class Active(CooperativeSensor):
     def offer(self, port: str) -> Any:
         """Say that variances differ from answer to answer, and what of the range's lasts."""
         offer: SensorOffer = super().offer(port)
+        period_s, every = float(1 / self.p.scan_rate_hz), self.p.far_every
         # The delay of a transponder and the error of an altimeter stay; of a range what is stated
         # beyond the other errors, of an elevation nearly all.
         lasting = {
@@ -207,15 +206,11 @@ class Active(CooperativeSensor):
         return replace(
             offer, azimuth_variance_rad2=None, elevation_variance_rad2=None,
             range_variance_m2=None, lasting=lasting if self._errs else {}, unstated_across_m2=0.0,
-            promises=self._promises(),
+            promises=promises_of_looks(
+                period_s, [(math.inf, every * period_s)] if every > 1 else ()
+            ),
             tells=self._errs, told_errors=_TOLD_ERRORS if self._errs else (),
         )  # fmt: skip
-
-    def _promises(self) -> tuple[tuple[float, float], ...]:
-        """Return in which time an aircraft is asked again that is far: in as many scans."""
-        period_s = float(1 / self.p.scan_rate_hz)
-        every = self.p.far_every
-        return promises_of_looks(period_s, [(math.inf, every * period_s)] if every > 1 else ())
 
     def answer_probability(self, cells: Cells) -> FloatArray:
         """Return the probability that each cell's aircraft answers if it is asked."""
@@ -366,7 +361,14 @@ class Active(CooperativeSensor):
         ground = np.sqrt(np.maximum(1.0 - rise**2, 0.0))
         ned = distance * np.stack([ground * np.cos(bearing), ground * np.sin(bearing), -rise])
         azimuth, elevation, _ = in_body(own, ned)
-        variances = self._variances(cells, detected, ned, altitude, deviation)
+        variances = (np.full(len(detected), _LEAST_M2),) * 3
+        if self._errs:
+            position_m, attitude_rad = navigation_noise(self.context)
+            variances = variances_of_replies(
+                ned, deviation**2 + attitude_rad[0] ** 2, max(position_m[:2]) ** 2, altitude,
+                self._step_ft(cells, detected, altitude),
+                cells.roster.equipage.mode_s[cells.craft[detected]],
+            )  # fmt: skip
         beside: dict[str, Any] = variances_in_body(own, ned, variances)
         if self._errs:
             beside["told_by_target"] = self._told(cells, detected, altitude, deviation)
@@ -398,25 +400,3 @@ class Active(CooperativeSensor):
     def _mode_step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
         mode_s = cells.roster.equipage.mode_s[cells.craft[which]]
         return np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)
-
-    def _variances(
-        self,
-        cells: Cells,
-        detected: AnyArray,
-        ned: FloatArray,
-        altitude_m: FloatArray,
-        deviation: FloatArray,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return variances of the position across, along and vertical, m²."""
-        if not self._errs:
-            least = np.full(len(detected), _LEAST_M2)
-            return least, least, least
-        mode_s = cells.roster.equipage.mode_s[cells.craft[detected]]
-        # The altitude is that of no pose; bearing and range are counted from the ownship's own.
-        position_m, attitude_rad = navigation_noise(self.context)
-        place_m2 = max(position_m[:2]) ** 2
-        across = (np.hypot(ned[0], ned[1]) ** 2) * (deviation**2 + attitude_rad[0] ** 2) + place_m2
-        along = RANGE_ERROR_M**2 + np.where(mode_s, *RANGE_BIAS_M) ** 2 + place_m2
-        step_ft = self._step_ft(cells, detected, altitude_m)
-        feet2 = altimetry_variance_ft2(altitude_m / FOOT_M) + step_ft**2 / 12.0
-        return np.maximum(across, _LEAST_M2), along, feet2 * FOOT_M**2

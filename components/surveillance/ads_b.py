@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.known_targets import known_targets
-from components.geometry import POSITION_FIELDS, line_of_sight_ned, turned_by_meridians
+from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY, TOLD
 from components.messages.detections import Detections, SensorOffer, promises_of_looks
 from components.messages.reach import Reach
@@ -28,6 +28,7 @@ from components.surveillance.broadcast import (
     Broadcasts,
     Sent,
     Transponders,
+    velocity_in_axes_at,
 )
 from components.surveillance.cooperative import (
     STEP_S,
@@ -40,7 +41,7 @@ from components.surveillance.reception import (
     AIRPORTS_AROUND,
     LAWS,
     fitted,
-    time_to_receive_s,
+    promises_by_range,
 )
 from components.surveillance.reports import unreported
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
@@ -55,8 +56,6 @@ from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
 
-#: Of so many ranges it is told how long a message takes to come.
-_PROMISED_RANGES = 40
 #: Longest time that a message counts for: nobody is reported by older ones.
 LONGEST_S = 5.0
 
@@ -70,19 +69,15 @@ class AdsBParameters(CooperativeParameters):
         "20 nmi; the law fitted to 23 receivers, to 290 nmi.",
     )
     aircraft_around: float = Field(
-        default=AIRCRAFT_AROUND,
-        ge=0,
-        le=300,
+        default=AIRCRAFT_AROUND, ge=0, le=300,
         description="Aircraft that a receiver of the fitted law hears besides, whose messages "
         "garble each other; the median of the 23 receivers is 95.",
-    )
+    )  # fmt: skip
     airports_around: float = Field(
-        default=AIRPORTS_AROUND,
-        ge=20,
-        le=100,
+        default=AIRPORTS_AROUND, ge=20, le=100,
         description="Airports around a receiver of the fitted law, which stand for the aircraft "
         "that are low.",
-    )
+    )  # fmt: skip
     position_errors: Literal["none", "white", "gauss_markov"] = Field(
         default="gauss_markov",
         description="Errors of what aircraft send, by their NACp and NACv and of their altimeters: "
@@ -94,11 +89,9 @@ class AdsBParameters(CooperativeParameters):
         "whole knots, 64 ft/min.",
     )
     velocity_age_s: float = Field(
-        default=3.0,
-        ge=0.5,
-        le=LONGEST_S,
+        default=3.0, ge=0.5, le=LONGEST_S,
         description="Oldest velocity message that goes with a position, s.",
-    )
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _within_reception(self) -> Self:
@@ -168,21 +161,6 @@ ERRORS = Ladder(
 )  # fmt: skip
 
 
-def _in_axes_at(
-    position: list[FloatArray], north_east_down: FloatArray, later_s: FloatArray
-) -> FloatArray:
-    """Return velocities in the axes of positions that are later than they are, (3, n).
-
-    North turns with the meridians, within a mile of a pole by degrees from message to message.
-    """
-    turned = north_east_down
-    for _ in range(3):
-        back = np.nan_to_num(turned * -later_s)
-        lat, lon, _ = displaced_position(*position, *back)
-        turned = turned_by_meridians(north_east_down, (lat, lon), (position[0], position[1]))
-    return turned
-
-
 class AdsB(CooperativeSensor):
     """Reports equipped aircraft by the last position and velocity messages received of each.
 
@@ -229,23 +207,16 @@ class AdsB(CooperativeSensor):
         # Of targets that may be anything some may be late.
         late = [(one.equipage.late_s > 0.0).any() for one in known_targets(self.context)]
         told = (*told, LATE) if any(late or [True]) else told
+        far_m = min(self.reach.range_max_m, LAWS[self.p.reception][1])
         return replace(
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
             lasting=lasting_errors(self.p.position_errors), unstated_across_m2=0.0,
-            promises=self._promises(),
+            promises=promises_of_looks(
+                float(1 / self.p.scan_rate_hz), promises_by_range(self.law, far_m)
+            ),
             tells=True, told_errors=told,
         )  # fmt: skip
-
-    def _promises(self) -> tuple[tuple[float, float], ...]:
-        """Return in which time an aircraft's next position has come, 19 times in 20, by range."""
-        reach_m = min(self.reach.range_max_m, LAWS[self.p.reception][1])
-        ranges_m = np.array([math.inf])
-        if math.isfinite(reach_m):
-            ranges_m = np.linspace(0.0, reach_m, _PROMISED_RANGES + 1)[1:]
-        within_s = time_to_receive_s(self.law(ranges_m))
-        promises = zip(ranges_m.tolist(), within_s.tolist(), strict=True)
-        return promises_of_looks(float(1 / self.p.scan_rate_hz), promises)
 
     @property
     def steps(self) -> dict[str, float]:
@@ -389,7 +360,7 @@ class AdsB(CooperativeSensor):
         now_s = cells.state_ns[detected] / NANOSECONDS
         age_s = now_s - said["reported_s"]
         position = [said[f"reported_{name}"] for name in POSITION_FIELDS]
-        velocity = _in_axes_at(position, velocity, said["reported_s"] - said["velocity_s"])
+        velocity = velocity_in_axes_at(position, velocity, said["reported_s"] - said["velocity_s"])
         carried = np.nan_to_num(velocity)
         ned = towards(own, *displaced_position(*position, *(carried * age_s)))
         # Its velocity is in its own axes, which are turned against ours.

@@ -203,3 +203,18 @@ class Broadcasts:
         y, x = encode(lat, lon, odd)
         lat, lon = decode_near(y, x, odd, lat, lon)
         return lat, lon, feet * FOOT_M
+
+
+def velocity_in_axes_at(
+    position: list[FloatArray], north_east_down: FloatArray, later_s: FloatArray
+) -> FloatArray:
+    """Return velocities in the axes of positions that are later than they are, (3, n).
+
+    North turns with the meridians, within a mile of a pole by degrees from message to message.
+    """
+    turned = north_east_down
+    for _ in range(3):
+        back = np.nan_to_num(turned * -later_s)
+        lat, lon, _ = displaced_position(*position, *back)
+        turned = turned_by_meridians(north_east_down, (lat, lon), (position[0], position[1]))
+    return turned

@@ -25,6 +25,8 @@ DO_365_RANGES_M = (10.0 * NAUTICAL_MILE_M, 20.0 * NAUTICAL_MILE_M)
 DO_365_IN_1_S = (1.0 - 0.05 ** (1.0 / 3.0), 1.0 - 0.05 ** (1.0 / 7.0))
 #: Squitters of one kind in a second, on average.
 _PER_SECOND = 2.0
+#: Of so many ranges it is told how long a message takes to come.
+_PROMISED_RANGES = 40
 
 
 def fitted(
@@ -66,6 +68,17 @@ def time_to_receive_s(probability: FloatArray) -> FloatArray:
     messages = np.maximum(np.ceil(np.log(0.05) / missed - 1e-6), 1.0)
     # Messages are up to 0.6 s apart, and a tracker heeds a look a tenth of the time before it.
     return np.minimum(messages / _PER_SECOND + 0.2, 60.0)
+
+
+def promises_by_range(
+    law: Callable[[FloatArray], FloatArray], reach_m: float
+) -> list[tuple[float, float]]:
+    """Return up to which range an aircraft's next position has come in which time, m and s."""
+    ranges_m = np.array([np.inf])
+    if np.isfinite(reach_m):
+        ranges_m = np.linspace(0.0, reach_m, _PROMISED_RANGES + 1)[1:]
+    within_s = time_to_receive_s(law(ranges_m))
+    return list(zip(ranges_m.tolist(), within_s.tolist(), strict=True))
 
 
 def certain(range_m: FloatArray) -> FloatArray:

@@ -27,7 +27,8 @@ from components.surveillance.extended_squitter import (
     altitude_step_ft,
     speed_step_kt,
 )
-from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from components.surveillance.interrogation import RANGE_BIAS_M, RANGE_ERROR_M
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 #: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.
 _COMPACT_M2 = (6.0 * 111_195.0 / 2**17) ** 2 / 12.0
@@ -76,6 +77,25 @@ def unstated_errors(count: int) -> dict[str, FloatArray]:
     """Return the columns `TOLD` of reports without a velocity and without errors."""
     none, unknown = np.zeros(count), np.full(count, np.nan)
     return {name: none if name.endswith(("deviation", "age_s")) else unknown for name in TOLD}
+
+
+def variances_of_replies(
+    ned_m: FloatArray,
+    bearing_rad2: FloatArray,
+    place_m2: float,
+    altitude_m: FloatArray,
+    step_ft: FloatArray,
+    mode_s: BoolArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return mean square errors of where replies place aircraft: across, along and vertical, m².
+
+    Bearing and range are counted from the ownship's own place, which has `place_m2`; the altitude
+    is that of no pose.
+    """
+    across = np.hypot(ned_m[0], ned_m[1]) ** 2 * bearing_rad2 + place_m2
+    along = RANGE_ERROR_M**2 + np.where(mode_s, *RANGE_BIAS_M) ** 2 + place_m2
+    feet2 = altimetry_variance_ft2(altitude_m / FOOT_M) + step_ft**2 / 12.0
+    return np.maximum(across, _LEAST_M2), along, feet2 * FOOT_M**2
 
 
 @dataclass(frozen=True)

@@ -23,13 +23,17 @@ from components.estimation.modified_polar import (
     turned_about_vertical,
 )
 from components.tracking.gating import GatedPairs, log_density, log_gain
+from components.tracking.management import started
 from components.tracking.rules import TrackerRules
+from components.tracking.scans import TELLS, LookBatch
 from components.tracking.track_store import TrackStore, estimate_columns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 _LOG_2_PI = float(np.log(2.0 * np.pi))
 # Weights of JPDA are kept below this power of e: products of some of them still are numbers.
 _LARGEST_LOG = 200.0
+# How far an arc leaves a straight line, in deviations, before it is none.
+_BENT = 0.3
 
 #: Tracks after a look, which of them were hit, and of these ln(Pd N(z) / λ).
 Associated = tuple[TrackStore, BoolArray, FloatArray]
@@ -46,8 +50,13 @@ class Candidates:
     rules: TrackerRules
     tracks: TrackStore
     kinds: list[GatedPairs]
-    sensors: IntArray  # (detections,), mask of the sensors of each
+    batch: LookBatch
     pose: SensorPose  # Of each track's look
+
+    @cached_property
+    def sensors(self) -> IntArray:
+        """Mask of the sensors of each detection."""
+        return self.batch.contributors
 
     @cached_property
     def track(self) -> IntArray:
@@ -125,7 +134,7 @@ class OneToOne(Association, Protocol):
                 mine = mine[np.argsort(which)]
                 which = one.track[mine]
             estimates = rules.estimator.update(part.estimates(), which, one.measured, mine)
-            correct_angle_only(part, which, one, mine, pairs.pose, estimates)
+            corrected(pairs, which, one, mine, estimates)
             mask = sensors[one.detection[mine]]
             gain[which] = log_gain(rules, part, one, sensors)[mine]
             hit[which] = True
@@ -142,6 +151,8 @@ class OneToOne(Association, Protocol):
                 "nis": before["nis"] + nis,
                 "freedom": before["freedom"] + one.kind.size,
             }
+            if one.own_m_s is not None:
+                new["own_m_s"] = one.own_m_s[:, mine]
             part = part.put(which, new)
         return part, hit, gain
 
@@ -190,17 +201,21 @@ class JointProbabilistic(Association):
         for one in kinds:
             which = np.arange(len(one.track))
             updated = rules.estimator.update(part.estimates(), one.track, one.measured, which)
-            correct_angle_only(part, one.track, one, which, pairs.pose, updated)
+            corrected(pairs, one.track, one, which, updated)
             updates.append(updated)
         merged = rules.estimator.merge(
             part.estimates(), missed, track, share, Estimates.joined(updates)
         )
         hit = taken > 0.5
         order = np.lexsort((share, track))
-        last = np.flatnonzero(np.append(track[order][1:] != track[order][:-1], True))
-        likeliest = np.zeros(count, dtype=np.int64)
-        likeliest[track[order][last]] = sensors[entry[order][last]]
-        mask = np.where(hit, likeliest, 0)
+        likeliest = order[np.append(track[order][1:] != track[order][:-1], True)]
+        mask, own_m_s = np.zeros(count, dtype=np.int64), part.own_m_s.copy()
+        mask[track[likeliest]] = sensors[entry[likeliest]]
+        mask = np.where(hit, mask, 0)
+        if kinds[0].own_m_s is not None:
+            told = np.concatenate([one.own_m_s for one in kinds], axis=1)
+            own_m_s[:, track[likeliest]] = told[:, likeliest]
+            own_m_s = np.where(hit, own_m_s, part.own_m_s)
         ranged = np.zeros(count, dtype=bool)
         for one in kinds:
             if one.measures_range:
@@ -210,6 +225,7 @@ class JointProbabilistic(Association):
             contributors=part.contributors | mask,
             updated_by=np.where(hit, mask, part.updated_by),
             ranged=part.ranged | (ranged & hit),
+            own_m_s=own_m_s,
         )
         return changed, hit, gain
 
@@ -220,22 +236,34 @@ ASSOCIATIONS: dict[str, Association] = {
 }  # fmt: skip
 
 
-def correct_angle_only(
-    part: TrackStore,
-    track: IntArray,
-    one: GatedPairs,
-    pair: IntArray,
-    pose: SensorPose,
-    estimates: Estimates,
+def corrected(
+    pairs: Candidates, track: IntArray, one: GatedPairs, pair: IntArray, estimates: Estimates
 ) -> None:
-    """Bring corrections of angle-only tracks into modified polar coordinates, in place.
+    """Bring corrections of tracks that no Gaussian along straight axes describes right, in place.
 
-    Those by coarse bearings are brought onto arcs. `estimates` are those of the tracks
-    `track` of the predicted `part` after the pairs `pair`.
+    Those of angle-only tracks are brought into modified polar coordinates. What coarse bearings
+    leave of a target is an arc: there corrections turn it, but a report of where it is, whose
+    errors lie along fixed axes, begins it anew if it is bent. `estimates` are those of the tracks
+    `track` of the predicted ones after the pairs `pair`.
     """
+    part, pose = pairs.tracks, pairs.pose
     angle_only = (~part.ranged[track]).nonzero()[0]
     if one.own_m_s is not None:
-        turn_coarse(part, track, one.own_m_s[:, pair], pose, estimates)
+        own_m_s, batch, entry = one.own_m_s[:, pair], pairs.batch, one.detection[pair]
+        known = np.isnan(own_m_s[0]) & ~np.isnan(part.own_m_s[0, track])
+        reports = batch.code[entry] & TELLS > 0
+        own_m_s = np.where(known & ~reports, part.own_m_s[:, track], own_m_s)
+        turn_coarse(part, track, own_m_s, pose, estimates)
+        anew = np.flatnonzero(known & reports)
+        anew = anew[is_bent(part.take(track[anew]), pose.take(track[anew]))]
+        if len(anew):
+            begun = started(
+                pairs.rules, batch.scans, pose.take(track[anew]), batch.code[entry[anew]],
+                batch.detection[entry[anew]],
+            )  # fmt: skip
+            now, new = ([*one.states, *one.covariances, one.weights] for one in (estimates, begun))
+            for whole, some in zip(now, new, strict=True):
+                whole[..., anew] = some
     if one.kind.has_range or len(angle_only) == 0:
         return
     which = track[angle_only]
@@ -255,7 +283,7 @@ def correct_angle_only(
 def turn_coarse(
     part: TrackStore, track: IntArray, own_m_s: FloatArray, pose: SensorPose, estimates: Estimates
 ) -> None:
-    """Bring corrections by coarse bearings onto arcs, in place; NaN where a bearing is not."""
+    """Bring corrections of coarse bearings onto arcs, in place; NaN where a bearing is not."""
     coarse = np.flatnonzero(~np.isnan(own_m_s[0]))
     if not len(coarse):
         return
@@ -266,6 +294,23 @@ def turn_coarse(
             selected(before, which), selected(state, coarse), selected(covariance, coarse),
             selected(pose.position_m, which), own_m_s[:, coarse],
         )  # fmt: skip
+
+
+def is_bent(part: TrackStore, pose: SensorPose) -> BoolArray:
+    """Return which tracks are spread so far across the line of sight that an arc is no line.
+
+    At two deviations a straight line leaves it by `_BENT` of the deviation along it.
+    """
+    result = np.zeros(len(part), dtype=bool)
+    for state, spread in zip(part.states(), part.covariances(), strict=True):
+        x, y, _ = state[:3] - pose.position_m
+        ground = np.maximum(np.hypot(x, y), 1.0)
+        cos, sin = x / ground, y / ground
+        both = 2.0 * cos * sin * spread[0, 1]
+        along = cos * cos * spread[0, 0] + sin * sin * spread[1, 1] + both
+        across = sin * sin * spread[0, 0] + cos * cos * spread[1, 1] - both
+        result |= 2.0 * across > _BENT * ground * np.sqrt(along)
+    return result
 
 
 def joined(parts: Sequence[Any]) -> Any:

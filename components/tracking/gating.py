@@ -1,7 +1,7 @@
 """Pairs of a track and a detection in its gate."""
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -40,6 +40,7 @@ class GatedPairs:
     #: What else was measured, of tracks without a range: ranges and their variances.
     ranges: tuple[FloatArray, FloatArray] | None = None
     #: (3, pairs) or None: The ownship's velocity, of bearings coarse beside their ranges; else NaN.
+    #: None where no error is carried.
     own_m_s: FloatArray | None = None
 
     @property
@@ -63,13 +64,20 @@ def gated_pairs(
     held = np.zeros(len(batch.detection), dtype=bool)
     direction = None
     some_angle_only = bool((~part.ranged).any())
+    linear, on_arc = rules.estimator.linear, ~np.isnan(part.own_m_s[0])
+    apart = linear is not rules.estimator and bool(on_arc.any())
     spread = _PairVariance(rules, part, pose, scans)
     for code in np.bincount(batch.code).nonzero()[0].tolist():
         mine = (batch.code == code).nonzero()[0]
         # What an angle-only track expects of a range says nothing: there the direction decides.
-        for ranged in (True, False) if some_angle_only and code & 1 else (None,):
+        ways = product(
+            (True, False) if some_angle_only and code & 1 else (None,),
+            (True, False) if apart else (None,),
+        )
+        for ranged, arc in ways:
             kind, rows = kind_of(0 if ranged is False else code)
-            moments = rules.estimator.expect(kind, part.estimates(), pose)
+            estimator = linear if arc else rules.estimator
+            moments = estimator.expect(kind, part.estimates(), pose)
             # Moments of sigma points are means over them: not where the state itself is seen.
             direction = moments[0].expected[:2] if moments[0].left_over is None else None
             # The box of a kind that tells of errors is not about its gate, and decides itself.
@@ -78,14 +86,19 @@ def gated_pairs(
             if ranged is not None:
                 chosen = part.ranged[track] == ranged
                 track, entry = track[chosen], entry[chosen]
+            if arc is not None:
+                chosen = on_arc[track] == arc
+                track, entry = track[chosen], entry[chosen]
             if len(track) == 0:
                 continue
             cells = batch.detection[entry]
             measured = _picked(scans.measured, rows, cells)
-            own_m_s = None
+            own_m_s = None if rules.carried is None else np.full((3, len(cells)), np.nan)
             if rules.carried is not None and code & TELLS and ranged is not False:
                 own_m_s = rules.carried.own_m_s(scans, cells)
-                reported = rules.carried.reported(scans, cells)
+                reported = rules.carried.reported(scans, cells).reported_by(
+                    part.covariance0.take(track, -1), part.state0[3:6].take(track, -1)
+                )
                 white = rules.carried.white(scans, cells, rows)
                 measured[:2], level_pose = levelled(measured[:2], pose.take(track))
                 mine_then = part.take(track)
@@ -96,7 +109,7 @@ def gated_pairs(
                         ages.added(result, model, state, covariance), considered=reported.considered
                     )
                     for result, model, state, covariance in zip(
-                        rules.estimator.expect(kind, mine_then.estimates(), level_pose, reported),
+                        estimator.expect(kind, mine_then.estimates(), level_pose, reported),
                         rules.estimator.models, mine_then.states(), mine_then.covariances(),
                         strict=True,
                     )

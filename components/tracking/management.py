@@ -3,10 +3,7 @@
 Two rules confirm: m hits among the last n expected looks, or the sequential likelihood ratio of
 Wald, applied to tracks by Sittler (IEEE Trans. Military Electronics 8, 1964): the logarithm of the
 odds that there is something rises with every hit by ln(Pd N(z) / λ) and falls with every
-misdetection by ln(1 - Pd Pg). A look counts for a track only if the track lies in the field of the
-sensor, and only of sensors that see it: one that never hit it, or that has missed it for a while
-where another one hits, may be too far away, and says nothing. Nor does one that has reported the
-track, or was counted as missing it, within the time in which it promises a report.
+misdetection by ln(1 - Pd Pg). Which looks count, `components.tracking.promises` says.
 """
 
 from typing import Any
@@ -17,15 +14,14 @@ from components.estimation.batched import (
     product,
     product_transposed,
     selected,
-    squared_length,
     symmetric,
 )
 from components.estimation.estimator import Estimates
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import innovation, updated
 from components.estimation.measurement import Kind, expected, linearised, position_of
-from components.messages.reach import EVALUATE
 from components.messages.state_tracks import COASTED, CONFIRMED, DELETED, TENTATIVE
+from components.tracking.promises import misdetection_counts, range_of
 from components.tracking.rules import LONGEST_WINDOW, TrackerRules
 from components.tracking.scans import TELLS, LookBatch, Scans, kind_of
 from components.tracking.track_store import NEVER, TrackStore, estimate_columns
@@ -33,10 +29,6 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: Odds are kept within this: a track of an hour must not take an hour to be doubted.
 LARGEST_SCORE = 20.0
-#: Looks come a little before their time where a clock jitters.
-_NEARLY = 0.9
-#: After so many misdetections a sensor is taken not to see a track that another one sees.
-BLIND_AFTER = 5
 
 
 def judged(
@@ -76,14 +68,6 @@ def _confirmed(
     return gained >= high, gained <= low
 
 
-def seeing(misdetections: IntArray) -> BoolArray:
-    """Return which sensors see which tracks, (sensors, n), from their misdetections."""
-    return np.asarray(
-        (misdetections < BLIND_AFTER)
-        | ((misdetections == misdetections.min(axis=0)) & (misdetections < NEVER))
-    )
-
-
 def bits_set(values: IntArray) -> IntArray:
     """Return how many bits are 1 in numbers below 2^62."""
     v = values - (values >> 1 & 0x5555555555555555)
@@ -109,44 +93,15 @@ def initiated(
     """Return a track for each of the chosen detections, and the next number of each replica."""
     scans, looks, replica = batch.scans, batch.look, batch.replica
     detection, of, codes = batch.detection[chosen], batch.of[chosen], batch.code[chosen]
-    count = len(detection)
-    sizes = [model.size for model in rules.estimator.models]
-    measured, variance = (
-        selected(scans.measured[:3], detection),
-        selected(scans.variance[:3], detection),
-    )
+    count, pose = len(detection), batch.pose(of)
+    estimates = started(rules, scans, pose, codes, detection)
     ranged = codes % 2 == 1
-    mean, deviation = rules.start_range_m
-    measured[2] = np.where(ranged, measured[2], mean)
-    variance[2] = np.where(ranged, variance[2], deviation**2)
-    # Nearer than its own error nothing has a direction; a false alarm may be reported at range 0.
-    measured[2] = np.maximum(measured[2], np.sqrt(variance[2]))
-    pose = batch.pose(of)
-    position, jacobian = position_of(measured, pose)
-    spread = np.zeros((6, 6, count))
-    spread[:3, :3] = product_transposed(product(jacobian, _diagonal(variance)), jacobian)
-    spread[:3, :3] = 0.5 * (spread[:3, :3] + spread[:3, :3].swapaxes(0, 1))
-    for i in range(3, 6):
-        spread[i, i] = rules.p.start_speed_m_s**2
-    if rules.p.start_climb_m_s is not None:
-        spread[5, 5] = rules.p.start_climb_m_s**2
-    states, covariances = [], []
-    begin = _start_by_reports(rules, scans, pose, codes, detection, position, spread)
-    known = 6 + rules.estimator.errors
-    for size in sizes:
-        state, covariance = np.zeros((size, count)), np.zeros((size, size, count))
-        state[:known], covariance[:known, :known] = begin
-        for i in range(known, size):
-            covariance[i, i] = rules.start_deviation(size - rules.estimator.errors) ** 2
-        _update_by_rates(scans, pose, codes, detection, state, covariance)
-        states.append(state)
-        covariances.append(covariance)
     counts = np.bincount(of, minlength=len(looks))
     within = np.arange(count) - (np.cumsum(counts) - counts)[of]
     tick, mask, ones = scans.tick[looks][of], scans.contributors[detection], np.ones(count)
     whole = ones.astype(np.int64)
     by = (mask >> np.arange(len(rules.fields))[:, np.newaxis] & 1).astype(bool)
-    range_m = np.where(ranged, measured[2], np.inf)
+    range_m = np.where(ranged, scans.measured[2].take(detection), np.inf)
     born = TrackStore(
         replica=replica[of],
         number=next_number[of] + within,
@@ -169,9 +124,8 @@ def initiated(
         seen=np.full((3, len(rules.fields), count), np.nan),
         seen_tick=np.full((len(rules.fields), count), -1),
         counted_tick=np.broadcast_to(tick, by.shape),
-        **estimate_columns(
-            Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
-        ),
+        own_m_s=_own_of_coarse(rules, scans, codes, detection),
+        **estimate_columns(estimates),
     )
     status = judged(rules, born.status, born.history, born.looks, born.misses, born.score)
     born = born.with_columns(
@@ -180,44 +134,51 @@ def initiated(
     return born, next_number + counts
 
 
-def expected_looks(
-    rules: TrackerRules,
-    part: TrackStore,
-    of: IntArray,
-    batch: LookBatch,
-    pose: SensorPose,
-    direction: FloatArray | None,
-) -> BoolArray:
-    """Return which sensors looked where the tracks are that they see, and when they were due.
+def started(
+    rules: TrackerRules, scans: Scans, pose: SensorPose, codes: IntArray, detection: IntArray
+) -> Estimates:
+    """Return what is known of a target by one detection alone, of several kinds `codes`."""
+    count = len(detection)
+    measured, variance = (
+        selected(scans.measured[:3], detection),
+        selected(scans.variance[:3], detection),
+    )
+    ranged = codes % 2 == 1
+    mean, deviation = rules.start_range_m
+    measured[2] = np.where(ranged, measured[2], mean)
+    variance[2] = np.where(ranged, variance[2], deviation**2)
+    # Nearer than its own error nothing has a direction; a false alarm may be reported at range 0.
+    measured[2] = np.maximum(measured[2], np.sqrt(variance[2]))
+    position, jacobian = position_of(measured, pose)
+    spread = np.zeros((6, 6, count))
+    spread[:3, :3] = product_transposed(product(jacobian, _diagonal(variance)), jacobian)
+    spread[:3, :3] = 0.5 * (spread[:3, :3] + spread[:3, :3].swapaxes(0, 1))
+    for i in range(3, 6):
+        spread[i, i] = rules.p.start_speed_m_s**2
+    if rules.p.start_climb_m_s is not None:
+        spread[5, 5] = rules.p.start_climb_m_s**2
+    states, covariances = [], []
+    begin = _start_by_reports(rules, scans, pose, codes, detection, position, spread)
+    known = 6 + rules.estimator.errors
+    sizes = [model.size for model in rules.estimator.models]
+    for size in sizes:
+        state, covariance = np.zeros((size, count)), np.zeros((size, size, count))
+        state[:known], covariance[:known, :known] = begin
+        for i in range(known, size):
+            covariance[i, i] = rules.start_deviation(size - rules.estimator.errors) ** 2
+        _update_by_rates(scans, pose, codes, detection, state, covariance)
+        states.append(state)
+        covariances.append(covariance)
+    return Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
 
-    (sensors, tracks)
-    """
-    scans = batch.scans
-    sensors = np.where(scans.tells_misses[batch.look], scans.sensors[batch.look], 0)
-    used = int(np.bitwise_or.reduce(sensors)) if len(sensors) else 0
-    looked = np.zeros((len(rules.fields), len(part)), dtype=bool)
-    if used == 0:
-        return looked
-    mine = sensors[of]
-    sees = seeing(part.misdetections)
-    where: tuple[FloatArray, FloatArray, FloatArray] | None = None
-    for i, field in enumerate(rules.fields):
-        if not used >> i & 1:
-            continue
-        looked[i] = (mine >> i & 1).astype(bool) & sees[i]
-        if rules.promises is not None:
-            promised = _NEARLY * rules.promises.ticks(i, range_of(part, pose))
-            looked[i] &= part.tick - part.counted_tick[i] >= promised
-        if field is None:
-            continue
-        if where is None:
-            if direction is None:
-                direction = expected(Kind(False), part.state0, pose)
-            away = range_of(part, pose)
-            where = (*direction, np.where(part.ranged, away, 0.0))
-        inside = np.ones(len(part), dtype=bool)
-        looked[i] &= field.decide(*where, inside) == EVALUATE
-    return looked
+
+def _own_of_coarse(
+    rules: TrackerRules, scans: Scans, codes: IntArray, detection: IntArray
+) -> FloatArray:
+    """Return how the ownship moved at detections with coarse bearings, (3, n); else NaN."""
+    if rules.carried is None or scans.reported is None:
+        return np.full((3, len(detection)), np.nan)
+    return np.where(codes & TELLS > 0, rules.carried.own_m_s(scans, detection), np.nan)
 
 
 def managed(
@@ -250,13 +211,13 @@ def managed(
     updated_m2 = np.where(hit, spread_m2, part.updated_m2)
     ended = changed.ranged & (spread_m2 - updated_m2 > rules.p.delete_above_m**2)
     counted_tick = part.counted_tick
-    if rules.promises is not None:
+    if rules.promises:
         counts = looked | (by >> np.arange(len(looked))[:, np.newaxis] & 1).astype(bool)
         counted_tick = np.where(counts, np.maximum(counted_tick, changed.tick), counted_tick)
     if hit.any():
         # Who has not missed it, and has looked at it lately.
         lately = changed.tick - counted_tick <= rules.lives_ticks
-        sees = (misdetections == 0) & (lately if rules.promises is not None else True)
+        sees = (misdetections == 0) & (lately if rules.promises else True)
         life_ticks = np.where(hit, rules.life_ticks(sees, range_of(changed, pose)), life_ticks)
     ended |= changed.tick - updated_tick > life_ticks
     return changed.with_columns(
@@ -265,26 +226,6 @@ def managed(
         life_ticks=life_ticks, updated_m2=updated_m2, counted_tick=counted_tick,
         **now_seen(rules, changed, pose, by),
     )  # fmt: skip
-
-
-def range_of(part: TrackStore, pose: SensorPose) -> FloatArray:
-    """Return how far away tracks are that have a range, m; infinite for others."""
-    away = np.sqrt(squared_length(part.state0[:3] - pose.position_m))
-    return np.where(part.ranged, away, np.inf)
-
-
-def misdetection_counts(misdetections: IntArray, by: IntArray, looked: BoolArray) -> IntArray:
-    """Return each sensor's misdetections since its last hit, after a look.
-
-    `by` is the mask of the sensors that updated each track.
-    """
-    new = misdetections.copy()
-    hitting = int(np.bitwise_or.reduce(by)) if len(by) else 0
-    for i, mine in enumerate(looked):
-        new[i] += mine
-        if hitting >> i & 1:
-            new[i][(by >> i & 1).astype(bool)] = 0
-    return new
 
 
 def position_variance(part: TrackStore, *, late: bool = False) -> FloatArray:
@@ -393,7 +334,9 @@ def _start_by_reports(
     own += product_transposed(effects, effects)
     speeds = np.stack([own[i, i] for i in (3, 4, 5)])
     for model in rules.estimator.models:
-        own += ages.errors(model, speeds)[0] / len(rules.estimator.models)
+        own += ages.errors(model, np.zeros((model.size, len(cells))), speeds)[0] / len(
+            rules.estimator.models
+        )
     covariance[:6, :6, telling] = symmetric(own)
     covariance[:6, 6:, telling] = -effects
     covariance[6:, :6, telling] = -effects.swapaxes(0, 1)

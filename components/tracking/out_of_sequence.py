@@ -56,6 +56,11 @@ class Plan:
         """Whether tracks are reported after each: it is the last work that a row brings."""
         return np.append(self.row[1:] != self.row[:-1], True)[: len(self.row)]
 
+    @property
+    def begins(self) -> BoolArray:
+        """Whether each is the first of several works that a row brings."""
+        return np.append(True, self.row[1:] != self.row[:-1])[: len(self.row)] & ~self.reports
+
 
 @dataclass(frozen=True, eq=False)
 class Past:

@@ -18,6 +18,7 @@ from pydantic import Field, model_validator
 from components.estimation.estimator import Estimator
 from components.messages.detections import SensorOffer
 from components.messages.reach import Reach
+from components.tracking.promises import LIVES_S, Promises
 from components.tracking.reported_errors import CarriedErrors
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
@@ -118,33 +119,6 @@ def _of_cells(values: FloatArray, at: IntArray) -> FloatArray:
     return values.reshape(len(values), values[0].size).take(at, axis=1)
 
 
-@dataclass(frozen=True, eq=False)
-class Promises:
-    """In which time sensors report a target again that they see (`SensorOffer.promises`)."""
-
-    steps: tuple[tuple[tuple[float, float], ...], ...]  # Of each sensor
-    ticks_per_s: int
-
-    @classmethod
-    def of(
-        cls, offers: Mapping[str, Any], sensors: tuple[str, ...], ticks_per_s: int
-    ) -> "Promises | None":
-        """Return those of the sensors, or None where all report at every look."""
-        known = (offers.get(name) for name in sensors)
-        steps = tuple(one.promises if isinstance(one, SensorOffer) else () for one in known)
-        return cls(steps, ticks_per_s) if any(steps) else None
-
-    def ticks(self, sensor: int, range_m: FloatArray) -> FloatArray:
-        """Return the time of targets at some ranges, (n,); 0 at every look."""
-        if not (steps := self.steps[sensor]):
-            return np.zeros(len(range_m))
-        far, within_s = np.array(steps).T
-        step = np.minimum(np.searchsorted(far, range_m), len(far) - 1)
-        return np.asarray(within_s[step] * self.ticks_per_s)
-
-
-# A track lives without a detection for so long, s, and for so many promises of its sensors.
-_LIVES_S, _LIVES_PROMISES = 6.0, 3.0
 #: Looks that a track's history can hold.
 LONGEST_WINDOW = 62
 # What a sensor that states no reach is taken to see: all around, as far as this.
@@ -300,7 +274,7 @@ class TrackerRules:
     lasting: LastingErrors | None  # what of the sensors' errors is not new at every look
     unstated_across_m2: FloatArray | None  # (sensors,), as in `SensorOffer`
     carried: CarriedErrors | None  # what of it the filter carries as states
-    promises: Promises | None  # where sensors do not report at every look
+    promises: Promises  # where sensors do not report at every look
 
     @classmethod
     def of(
@@ -342,20 +316,13 @@ class TrackerRules:
     @property
     def lives_ticks(self) -> int:
         """How long a track lives whose sensors report at every look."""
-        return int(_LIVES_S * self.ticks_per_s)
+        return int(LIVES_S * self.ticks_per_s)
 
     def life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:
         """Return how long tracks live without a detection; `sees` (sensors, n) is who sees them."""
-        after_s = _LIVES_S if self.p.delete_after_s is None else self.p.delete_after_s
-        life = np.full(len(range_m), int(after_s * self.ticks_per_s))
-        if self.promises is None or self.p.delete_after_s is not None:
-            return life
-        soonest = np.full(len(range_m), np.inf)
-        for sensor, mine in enumerate(sees):
-            promised = _LIVES_PROMISES * self.promises.ticks(sensor, range_m)
-            soonest = np.minimum(soonest, np.where(mine, promised, np.inf))
-        soonest = np.where(np.isinf(soonest), 0.0, soonest)
-        return np.maximum(life, soonest.astype(np.int64))
+        if self.p.delete_after_s is not None:
+            return np.full(len(range_m), int(self.p.delete_after_s * self.ticks_per_s))
+        return self.promises.life_ticks(sees, range_m)
 
     def start_deviation(self, size: int) -> float:
         """Standard deviation, in a new track, of what a model has besides position and velocity."""

@@ -15,14 +15,12 @@ from components.estimation.out_of_sequence import (
 from components.messages.state_tracks import DELETED
 from components.tracking.association import Association, Candidates
 from components.tracking.gating import gated_pairs
-from components.tracking.management import expected_looks, initiated, managed, position_variance
+from components.tracking.management import initiated, managed, position_variance
+from components.tracking.promises import expected_looks
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import LookBatch
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-
-# More than there are tracks in a replica.
-_NUMBERS = 1 << 32
 
 
 def step(
@@ -79,8 +77,8 @@ def associated(
     """Return predicted tracks after the looks `of` them, and which detections start no track."""
     pose = batch.pose(of)
     kinds, direction, held = gated_pairs(rules, part, of, pose, batch)
-    looked = expected_looks(rules, part, of, batch, pose, direction)
-    pairs = Candidates(rules, part, kinds, batch.contributors, pose)
+    looked = expected_looks(rules.fields, rules.promises, part, of, batch, pose, direction)
+    pairs = Candidates(rules, part, kinds, batch, pose)
     changed, hit, gain = association.update(pairs)
     return managed(rules, part, changed, pose, looked, hit, gain), held
 
@@ -143,17 +141,14 @@ def late_step(
 
 
 def _ordered(parts: list[TrackStore]) -> TrackStore:
-    """Return all tracks by replica and number, as searches in them want them."""
-    whole = TrackStore.joined(parts)
-    return whole.take(np.lexsort((whole.number, whole.replica)))
+    return TrackStore.joined(parts).sorted_by_key()
 
 
 def _matched(before: TrackStore, now: TrackStore, tick: IntArray) -> tuple[IntArray, BoolArray]:
     """Return where tracks stand among those of before, and which speak of `tick` at the latest."""
     if len(before) == 0:
         return np.zeros(len(now), dtype=np.int64), np.zeros(len(now), dtype=bool)
-    keys = before.replica * _NUMBERS + before.number
-    key = now.replica * _NUMBERS + now.number
+    keys, key = before.key, now.key
     index = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
     there = (keys[index] == key) & (before.status[index] != DELETED)
     return index, there & (before.tick[index] <= tick)

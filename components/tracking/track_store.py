@@ -9,7 +9,7 @@ from components.estimation.batched import is_everything, selected
 from components.estimation.estimator import Estimates, combined
 from components.estimation.measurement import direction, range_share
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
-from components.messages.state_tracks import COVARIANCE, StateTracks
+from components.messages.state_tracks import COVARIANCE, DELETED, StateTracks
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.message import offsets_of
@@ -17,6 +17,8 @@ from dsa_des.block.wake import Wake
 
 #: Misdetections of a sensor that never hit a track.
 NEVER = 1 << 40
+# More than there are tracks in a run.
+_NUMBERS = 1 << 32
 
 
 class TrackStore(KeyedTable):
@@ -28,7 +30,9 @@ class TrackStore(KeyedTable):
     it had none. ``seen`` (3, sensors, n) is where the track was expected, azimuth, elevation and
     range, when each sensor last updated it, and ``seen_tick`` (sensors, n) when that was; NaN and
     -1 where it did not, or where all its errors are new at every look. ``counted_tick`` (sensors,
-    n) is when each sensor last hit it or was last counted as missing it.
+    n) is when each sensor last hit it or was last counted as missing it. ``own_m_s`` (3, n) is how
+    the ownship moved at the last detection, where that had a coarse bearing: then what is known of
+    the target lies on an arc; else NaN.
     """
 
     #: Columns beside states, with their types.
@@ -65,14 +69,31 @@ class TrackStore(KeyedTable):
             "misdetections": np.int64,
             "seen": float,
         }
-        types |= {"seen_tick": np.int64, "counted_tick": np.int64}
+        types |= {"seen_tick": np.int64, "counted_tick": np.int64, "own_m_s": float}
         shapes: dict[str, tuple[int, ...]] = {"weights": (len(sizes),), "misdetections": (sensors,)}
         shapes |= {"seen": (3, sensors), "seen_tick": (sensors,)}
-        shapes["counted_tick"] = (sensors,)
+        shapes |= {"counted_tick": (sensors,), "own_m_s": (3,)}
         for i, size in enumerate(sizes):
             types |= {f"state{i}": float, f"covariance{i}": float}
             shapes |= {f"state{i}": (size,), f"covariance{i}": (size, size)}
         return cls.empty(types, shapes)
+
+    @property
+    def key(self) -> IntArray:
+        """Of each track a number that no other one has, of any run; ascending in their order."""
+        return np.asarray(self.replica * _NUMBERS + self.number)
+
+    def sorted_by_key(self) -> Self:
+        """Return all tracks by run and number, as searches in them want them."""
+        return self.take(np.lexsort((self.number, self.replica)))
+
+    def with_ended(self, before: Self) -> Self:
+        """Return the tracks, and those of some before that are there no more, as deleted."""
+        gone = before.take(~np.isin(before.key, self.key))
+        if len(gone) == 0:
+            return self
+        ended = gone.with_columns(status=np.full(len(gone), DELETED))
+        return self.joined([self, ended]).sorted_by_key()
 
     def estimates(self) -> Estimates:
         """Return what the filter knows of the tracks."""
@@ -152,7 +173,7 @@ def tracks_after(store: TrackStore, records: KeyedTable, rows: IntArray) -> Trac
 #: Columns that no message shows.
 _UNSHOWN = {
     "history", "looks", "misses", "misdetections", "seen", "seen_tick", "counted_tick",
-    "life_ticks", "updated_m2",
+    "life_ticks", "updated_m2", "own_m_s",
 }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from components.estimation.frame import pose_in_frame
 from components.estimation.motion import ConstantVelocity
 from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.fused import FusedDetections
-from components.messages.state_tracks import CONFIRMED, StateTracks
+from components.messages.state_tracks import CONFIRMED, DELETED, StateTracks
 from components.sensor.marks import TRACKER
 from components.tracking.association import ASSOCIATIONS, Association
 from components.tracking.ladder import LADDERS
@@ -29,10 +29,10 @@ from components.tracking.out_of_sequence import (
     tracks_before,
     warning,
 )
+from components.tracking.promises import ACTS_EVERY_S, Silence
 from components.tracking.reported_errors import reported_errors, unknown_latency
 from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
 from components.tracking.scans import LookBatch, Scans, scans_of, when_made
-from components.tracking.silence import Silence
 from components.tracking.step import late_step, step
 from components.tracking.track_store import TrackStore, records_of, state_tracks, tracks_after
 from dsa_des.arrays.keyed_table import KeyedTable, turns
@@ -43,8 +43,6 @@ from dsa_des.block.wake import Wake
 from dsa_des.record.undone import Tries
 
 _NO_ROWS = np.empty(0, dtype=np.int64)
-#: How often tracks are looked through that nothing comes of, s.
-_ACTS_EVERY_S = Fraction(1, 2)
 #: Bits of a mask of sensors.
 MOST_SENSORS = 62
 # What makes a measured quantity exact, by the variance that then is 0.
@@ -124,7 +122,7 @@ class Tracker(Component):
 
     def acts_every_s(self) -> Fraction | None:
         """Return how often tracks are looked through that nothing comes of, s."""
-        return _ACTS_EVERY_S
+        return ACTS_EVERY_S
 
     def _lag_s(self) -> Fraction:
         if self.p.lag_s is not None:
@@ -253,11 +251,17 @@ class Tracker(Component):
         if len(silence):
             first, last = silence.before(row, records.worked_tick[plan.of])
         records.worked_tick[plan.of] = wake.ticks[row]
+        # Tracks as last shown, of runs in a row that brings several works: one may end in between.
+        shown_last, begins = store.take(_NO_ROWS), plan.begins
         for works in turns(plan.of):
             if len(store) and bool((first[works] <= last[works]).any()):
                 asked = records.take(plan.of[works])
                 store, more = silence.ended(store, asked, first[works], last[works])
                 reported += more
+            if len(store) and len(some := works[begins[works]]):
+                alive = store.status != DELETED
+                alive &= np.isin(store.replica, records.replica[plan.of[some]])
+                shown_last = TrackStore.joined([shown_last, store.take(alive)])
             late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
             if len(late):
                 of_late = plan.of[late]
@@ -283,8 +287,13 @@ class Tracker(Component):
             shown = works[reports[works]]
             if len(shown):
                 records.own[:, plan.of[shown]] = poses.position_m[:, plan.seen_from[shown]]
-            if len(store) and len(shown):
-                reported.append(tracks_after(store, records.take(plan.of[shown]), row[shown]))
+            told = store
+            if len(shown_last) and len(shown):
+                of_shown = np.isin(shown_last.replica, records.replica[plan.of[shown]])
+                told = store.with_ended(shown_last.take(of_shown))
+                shown_last = shown_last.take(~of_shown)
+            if len(told) and len(shown):
+                reported.append(tracks_after(told, records.take(plan.of[shown]), row[shown]))
         self._records = self._records.after(records.replica, records, wake.first_run)
         self._store = store
         if self._remembers:

@@ -258,3 +258,11 @@ def test_a_tab_that_is_opened_again_decides_while_nobody_else_does(tmp_path, mon
     session.go_on()
     session.stop()
     session.ended()
+
+
+def test_nothing_is_simulated_before_the_run_is_held_no_more(monkeypatch):
+    monkeypatch.setattr(control, "_LOOK_AGAIN_S", 0.001)
+    answers = iter([True, True, False])
+    pacer = control.LivePacer(1.0, lambda: next(answers), lambda time_s, lag_s: None)
+    pacer.start()
+    assert list(answers) == [] and pacer.paused_s > 0.0

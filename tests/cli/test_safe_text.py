@@ -99,4 +99,4 @@ def test_help_for_want_of_a_command_keeps_its_lines(capsys: pytest.CaptureFixtur
         with pytest.raises(SystemExit):
             main(words)
         said = "".join(capsys.readouterr())
-        assert "\n  -h, --help" in said and "\\n" not in said
+        assert "\n  -h, --help" in said and "\\n" not in said, said

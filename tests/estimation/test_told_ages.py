@@ -26,7 +26,7 @@ from components.estimation.estimator import Estimates, ExtendedKalmanFilter, pai
 from components.estimation.frame import pose_in_frame
 from components.estimation.kalman import linear_moments
 from components.estimation.measurement import Kind
-from components.estimation.motion import ConstantVelocity, CoordinatedTurn
+from components.estimation.motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn
 from components.estimation.unscented import SigmaPoints, UnscentedKalmanFilter
 
 KIND = Kind(True, False, True)
@@ -118,7 +118,7 @@ def begun(said, told, age, model, place):
     state, covariance = np.zeros((12, COUNT)), np.zeros((12, 12, COUNT))
     state[:6] = said
     effects = told.effects(said, place)
-    new = age.errors(model, np.ones((3, COUNT)))[0]
+    new = age.errors(model, state, np.ones((3, COUNT)))[0]
     for i in range(6):
         new[i, i] += WHITE_M2
         covariance[6 + i, 6 + i] = 1.0
@@ -189,24 +189,32 @@ def straight(place_m, speed_m_s, climb_m_s, intensity):
     return np.array(found)
 
 
-def test_what_a_target_did_since_is_in_what_is_told_of_earlier_by_how_old_it_is():
+@pytest.mark.parametrize("model", [ConstantVelocity(4.0), ConstantAcceleration(4.0)])
+def test_what_a_target_did_since_is_in_what_is_told_of_earlier_by_how_old_it_is(model):
     """A position carried on for 0.4 s of its 0.9, by a velocity 1.3 s old; updated 0.7 s ago.
 
-    By integrals over the white acceleration of so long ago, in steps: to a thousandth.
+    By integrals over the white acceleration or jerk of so long ago, in steps: to a thousandth.
     """
     carried_s, late_s, velocity_age_s, since_s = 0.4, 0.5, 1.3, 0.7
     ages = Ages(*(np.array([one]) for one in (carried_s, velocity_age_s, since_s, late_s)))
-    error, shared = ages.errors(ConstantVelocity(4.0), np.array([[0.0], [0.0], [9.0]]))
-    ago_s = (np.arange(20_000) + 0.5) * 1e-4  # for how long an acceleration has acted
+    still, many = np.zeros((model.size, 1)), model.size // 3
+    error, shared = ages.errors(model, still, np.array([[0.0], [0.0], [9.0]]))
+    ago_s = (np.arange(20_000) + 0.5) * 1e-4  # for how long it has acted
+    # Back from now it is taken for what always was: what was told of then lacks it.
     position = np.maximum(carried_s + late_s - ago_s, 0.0)
     velocity = -1.0 * (ago_s < velocity_age_s)
+    known = np.stack([ago_s, np.ones_like(ago_s)])
+    if many == 3:
+        position, velocity = -0.5 * position**2, np.maximum(velocity_age_s - ago_s, 0.0)
+        known = np.stack([0.5 * ago_s**2, ago_s, np.ones_like(ago_s)])
     told = np.stack([position + carried_s * velocity, velocity])
     # Of the track's own errors: what was new since, by which a prediction falls short.
-    known = -np.stack([ago_s, np.ones_like(ago_s)]) * (ago_s < since_s)
-    for found, one in ((error, told), (shared, -known)):
+    known = known * (ago_s < since_s)
+    for found, one in ((error, told), (shared, known)):
         wanted = 4.0 * 1e-4 * one @ told.T
         for axis in (0, 1, 2):
-            both = found[[axis, axis + 3]][:, [axis, axis + 3], 0]
+            rows = [axis + 3 * i for i in range(len(one))]
+            both = found[rows][:, [axis, axis + 3], 0]
             if found is error:  # by how late it is times twice the velocity's deviation
                 both = both - np.diag([4.0 * late_s**2 * (9.0 if axis == 2 else 0.0), 0.0])
             np.testing.assert_allclose(both, wanted, atol=3e-3)

@@ -27,12 +27,12 @@ EXCHANGE = Path(__file__).parent / "exchange.json"
 OWN = {"lat_deg": -33.9, "lon_deg": 179.99, "alt_m": 300.0, "heading_deg": 217.0, "speed_mps": 50.0}
 
 
-def scene(duration_s=30, **pilot):
+def scene(duration_s=30, up_m=20.0, **pilot):
     """An aircraft from the right that is where the ownship is after a minute."""
     nose = math.radians(217.0)
     east = 3000 * math.sin(nose) + 3600 * math.sin(nose + math.pi / 2)
     north = 3000 * math.cos(nose) + 3600 * math.cos(nose + math.pi / 2)
-    other = {"name": "cargo 7", "up_m": 20.0, "speed_mps": 60.0, "heading_deg": 127.0,
+    other = {"name": "cargo 7", "up_m": up_m, "speed_mps": 60.0, "heading_deg": 127.0,
              "east_m": east, "north_m": north}  # fmt: skip
     return {
         "duration_s": duration_s, "seed": 1, "record": {"truth": True},
@@ -131,6 +131,12 @@ def test_the_ownship_turns_as_the_autopilot_does(monkeypatch):
     assert slow.manoeuvres["rate_rad_s"][0].as_py() == pytest.approx(math.radians(1))
     none, _ = flown(monkeypatch, StandIn().reply, least_turn_deg=50)
     assert none.manoeuvres.num_rows == 0
+
+
+@pytest.mark.parametrize(("above_m", "turns"), [(-400, 0), (-100, 1)])
+def test_who_passes_far_below_is_let_pass(monkeypatch, above_m, turns):
+    run, _ = flown(monkeypatch, StandIn().reply, up_m=float(above_m), duration_s=12)
+    assert run.manoeuvres.num_rows == turns
 
 
 def climbing(datagram, wanders=0.0):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.sensor.grid import Grid
+from components.sensor.grid import Grid, SensorGrid
 
 sizes = st.floats(-1e9, 1e9)
 steps = st.floats(1e-6, 1e6)
@@ -153,3 +153,13 @@ def test_at_and_beside_half_steps_a_grid_rounds_as_remainders_say(step: float) -
     values = np.concatenate([half, np.nextafter(half, 0.0), np.nextafter(half, np.inf)])
     some = values[::97].tolist()
     assert Grid(step).round(values[::97]).tolist() == [exact(value, step) for value in some]
+
+
+def test_all_round_straight_astern_is_one_direction_from_either_side():
+    steps = {"azimuth": math.radians(2.0), "elevation": math.radians(1.0)}
+    grid = SensorGrid((-math.pi, math.pi), (-1.0, 1.0), steps)
+    off = np.radians([179.4, -179.4, 10.9])
+    azimuth, elevation, _ = grid.round(off, np.radians([0.4, 0.6, -7.6]), np.full(3, np.nan))
+    assert azimuth[0] == azimuth[1] and abs(azimuth[0]) == pytest.approx(math.pi, abs=1e-15)
+    assert math.degrees(azimuth[2]) == pytest.approx(10.0, abs=1e-12)
+    np.testing.assert_allclose(np.degrees(elevation), [0.0, 1.0, -8.0], atol=1e-12)

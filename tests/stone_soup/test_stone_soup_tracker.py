@@ -164,6 +164,31 @@ def test_looks_wait_for_older_ones_that_a_scene_foresees(tmp_path):
     assert simulation.components["tracker"].report() == {"late_looks": {"tracker": late}}
 
 
+def test_a_silent_tracker_is_given_looks_in_vain_until_its_tracks_end(tmp_path):
+    """The last detection is of 4 s; at 4 Hz nothing is expected for 6 s, at 1/4 Hz for 12."""
+    file = tmp_path / "own.py"
+    text = FAKE.format(size=6, length=6, mapping="(0, 2, 4)")
+    file.write_text(text.replace(
+        "return time, {self.track}",
+        "seen = max(when for when, some in self.given if some)\n"
+        "        return time, {self.track} if (time - seen).total_seconds() < 12.3 else set()",
+    ))  # fmt: skip
+    leaves = {**crooked.ROLLING, "end_time_s": 4.1}
+    for rate_hz, first_s, late_s in ((4, 10.0, 0), ("1/4", 16.0, 0), (4, 10.0, "0.3")):
+        table = chain(
+            {"radar": {**RADAR, "scan_rate_hz": rate_hz, "latency_s": late_s}}, targets=[leaves],
+            fusion={"type": "fusion.gated"}, duration_s=18,
+            tracker={"type": "tracking.stonesoup", "builder": f"{file}:build"},
+        )  # fmt: skip
+        times, told = given(Simulation(dsa_des.load_scene(table)))
+        in_vain = [time for time, (_, found) in zip(times, told, strict=True) if not found]
+        assert first_s <= min(in_vain) <= first_s + 0.5 and max(in_vain) <= 16.3 + 0.5
+        told.clear()  # of the class
+        *_, last = rows(run(table), "state_tracks")
+        assert last["track_status"] == "deleted"
+        assert 16.3 <= last["time_s"] <= 16.3 + 0.5 + float(late_s)
+
+
 def test_it_is_given_every_look_and_no_name(tmp_path):
     file = tmp_path / "fixed.py"
     file.write_text(FAKE.format(size=6, length=6, mapping="(0, 2, 4)"))

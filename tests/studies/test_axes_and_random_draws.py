@@ -105,6 +105,7 @@ def test_all_cells_share_seeds_and_draws(small: Path) -> None:
     assert len(study.cells) == 2
     assert study.labels(1) == {"radar.scan_rate_hz": 5}
     assert study.replica(3).changes.keys() == {draw.key for draw in study.draws}
+    assert study.replica(3).seed == replica_seed(study.seed, 3)
     runs = [
         (cell, k)
         for chunk in study.chunks(0, [0, 1])

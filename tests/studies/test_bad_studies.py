@@ -59,6 +59,7 @@ def changed(old: str, new: str) -> None:
         ("[axes]", '[axes]\nswap.radra = ["radar.threshold"]', "did you mean 'radar'?"),
         ("[axes]", '[axes]\nblocks.traffic.file = {files = "nowhere/*.daa"}', "no file matches"),
         ("uniform = [0, 0.2]", "uniform = [0, nan]", "uniform = [0, nan]: must be finite"),
+        ("uniform = [0, 0.2]", "uniform = [-inf, 0]", "uniform = [-inf, 0]: must be finite"),
         ("uniform = [0, 0.2]", "uniform = [-0.2, 0.3]",
          "study.toml: draws.blocks.radar.offset_s = -0.1"),
         ("uniform = [0, 0.2]", 'choice = [0.1, "x"]', "offset_s = 'x': must be a number"),

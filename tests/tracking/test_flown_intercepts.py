@@ -9,12 +9,17 @@ from tests.alerting.reference_data import reference_file
 BEGINNING_S = 20
 
 
+#: As the scene has it, by two models, and with all that `tracking.imm` has by default.
+TRACKERS = {"two models": [], "defaults": ["blocks.tracker={type='tracking.imm'}"]}
+
+
+@pytest.mark.parametrize("tracker", TRACKERS)
 @pytest.mark.parametrize("flight", [3, 23, 51])
-def test_a_flown_intercept_is_tracked_from_its_first_second_on(flight):
+def test_a_flown_intercept_is_tracked_from_its_first_second_on(flight, tracker):
     path = reference_file(f"nrc_intercepts/NRC_Intercept{flight}.daa")
     scene = dsa_des.load_scene(
         "configs/tracking/flown_intercept.toml",
-        sets=[f"blocks.traffic.file='{path}'", f"duration_s={BEGINNING_S}"],
+        sets=[f"blocks.traffic.file='{path}'", f"duration_s={BEGINNING_S}", *TRACKERS[tracker]],
     )
     study = dsa_des.study(scene, metrics=["tracking"], replicas=1, workers=1)
     found = {row["result"]: row["value"] for row in study.summary.to_pylist()}

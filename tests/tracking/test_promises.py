@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from wired import chain, rows, run
 
+import dsa_des
 from components.messages.detections import promises_of_looks
 from components.surveillance.reception import certain, do_365, time_to_receive_s
-from components.tracking.rules import Promises
+from components.tracking.promises import Promises
+from dsa_des.running.simulation import Simulation
 
 OWN = {"lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 2000, "heading_deg": 0, "speed_mps": 60}
 BESIDE = {"name": "beside", "up_m": 50, "heading_deg": 0, "speed_mps": 60, "mode_s": True,
@@ -103,6 +105,66 @@ def test_one_miss_is_not_the_end_of_a_slow_radar_s_track():
     gaps = np.diff(sorted({row["time_s"] for row in tracks}))
     assert 8.0 in gaps and max(gaps) <= 12.0
     assert {row["track"] for row in tracks} == {1}
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "duration_s", "silent_s", "lives_s"), [("1/5", 80, 50, 15.0), (20, 20, 8, 6.0)]
+)
+@pytest.mark.parametrize("fusion", ["pass_through", "gated", "pick_best"])
+def test_slow_and_fast_scans_with_losses_keep_who_is_heard_and_end_who_is_not(
+    fusion, rate_hz, duration_s, silent_s, lives_s
+):
+    """Two aircraft, one of which falls silent; a fifth of all scans is lost on the wire.
+
+    At 0.2 Hz a report is promised in 5 s, and three of these are waited for; at 20 Hz 6 s.
+    """
+    silent = {**BESIDE, "name": "silent", "north_m": 6000, "east_m": 4000,
+              "ads_b": {"nacp": 9, "nacv": 2, "silent_after_s": silent_s}}  # fmt: skip
+    scene = chain(
+        {"s": {"type": "surveillance.ads_b", "scan_rate_hz": rate_hz, "reception": "certain"}},
+        ownship=OWN, targets=[{**BESIDE, "north_m": 6000, "east_m": -4000}, silent],
+        duration_s=duration_s, fusion={"type": f"fusion.{fusion}"},
+        tracker={"type": "tracking.ekf"},
+    )  # fmt: skip
+    scene["wires"].remove("s -> fusion")
+    scene["wires"].append({"from": "s", "to": "fusion", "drop_probability": 0.2})
+    tracks = rows(run(scene), "state_tracks")
+    (end,) = [row for row in tracks if row["track_status"] == "deleted"]
+    assert {row["track"] for row in tracks} == {1, 2} and end["east_m"] > 0.0
+    assert silent_s - 5.0 < end["updated_s"] <= silent_s
+    # Within a second of a scan nothing is silent, and half a second later a tracker is awake.
+    assert lives_s < end["time_s"] - end["updated_s"] <= lives_s + 1.5
+    sure = [row for row in tracks if row["track_status"] in ("confirmed", "coasted")]
+    since = min(row["time_s"] for row in sure)
+    assert since <= (20.0 if rate_hz == "1/5" else 3.0)
+    assert max(row["time_s"] for row in sure if row["track"] != end["track"]) > duration_s - 10
+
+
+@pytest.mark.parametrize("seed", [1, 6])
+def test_one_cessna_at_20_hz_is_one_track_though_each_scan_draws_a_fade(seed):
+    """Some misses in a row, a fraction of a second of fades at 7 km, end no track.
+
+    `check` says that fades are drawn sooner than they can be over.
+    """
+    radar = {"type": "radar.swerling", "swerling": 1, "scan_rate_hz": 20, "range_km": 9,
+             "frequency_hz": 77e9, "calibrate": {"range_km": 3, "rcs_dbsm": 0, "pd": 0.9},
+             "false_alarm_probability": 1e-6, "azimuth_deg": [-60, 60], "elevation_deg": [-15, 15],
+             "azimuth_resolution_deg": 1.5, "elevation_resolution_deg": 1.5,
+             "range_resolution_m": 5.0}  # fmt: skip
+    cessna = {"name": "cessna", "north_m": 7000, "east_m": 300, "up_m": 60, "heading_deg": 180,
+              "speed_mps": 55, "rcs_dbsm": 5.0}  # fmt: skip
+    confirmed = {}
+    for name, tracker in (("time", {}), ("looks", {"delete_misses": 4})):
+        scene = chain(
+            {"radar": radar}, ownship=OWN, targets=[cessna], duration_s=25,
+            fusion={"type": "fusion.pass_through"}, tracker={"type": "tracking.ekf", **tracker},
+        ) | {"seed": seed}  # fmt: skip
+        tracks = rows(run(scene), "state_tracks")
+        sure = {row["track"] for row in tracks if row["track_status"] in ("confirmed", "coasted")}
+        confirmed[name] = len(sure)
+    assert confirmed["time"] == 1 < confirmed["looks"]
+    said = Simulation(dsa_des.load_scene(scene)).components["radar"].warnings()
+    assert any("each scan draws a fade of its own" in one for one in said)
 
 
 def test_a_given_time_is_that_time():

@@ -83,6 +83,24 @@ def near(*sets, duration_s="4"):
     )  # fmt: skip
 
 
+def test_who_is_held_is_held_across_windows():
+    """Of three the first and the last fly out of reach: they stay, in whatever windows."""
+    flights = [
+        {"name": name, "east_m": east_m, "north_m": 3950.0, "up_m": 0.0, "speed_mps": 60.0,
+         "heading_deg": heading_deg}
+        for name, east_m, heading_deg in (("a", -100, 0), ("b", 0, 180), ("c", 100, 0))
+    ]  # fmt: skip
+    own = {"lat_deg": 0.0, "lon_deg": 0.0, "alt_m": 500.0, "heading_deg": 0.0, "speed_mps": 1.0}
+    scene = chain(
+        {"radar": sensor("radar.range_boundary", range_km=4.0, scan_rate_hz=1)}, ownship=own,
+        targets=flights, duration_s=5, fusion={"type": "fusion.pass_through"},
+        tracker={"type": "tracking.hold_last"},
+    )  # fmt: skip
+    found = same_in_any_window(dsa_des.load_scene(scene), windows=(1,))["tracks"].to_pylist()
+    last_s = max(row["time_s"] for row in found)
+    assert [row["target"] for row in found if row["time_s"] == last_s] == ["a", "b", "c"]
+
+
 def test_tracks_know_nothing_of_the_roster(monkeypatch):
     """Targets are renumbered, and all that is true is replaced, before the tracker sees it."""
     from components.tracking.filters import ExtendedKalman

@@ -69,6 +69,19 @@ def test_the_others_are_told_as_they_were():
     assert {row["state_s"] for row in found[-3:]} == {5.0}
 
 
+@pytest.mark.parametrize(("late_s", "late"), [(0, "drop"), ("0.5", "drop"), ("0.5", "rerun")])
+def test_a_track_that_ends_between_two_looks_of_one_row_is_told_once(late_s, late):
+    """Both radars look at 4.5 s; it ends at the first of the two looks, and the other is empty."""
+    sensors = {"one": RADAR, "other": {**RADAR, "latency_s": late_s}}
+    scene = chain(
+        sensors, targets=[LEAVES], fusion={"type": "fusion.pass_through"}, duration_s=7,
+        tracker={"type": "tracking.ekf", "delete_misses": 1, "late": late},
+    )  # fmt: skip
+    found = rows(run(scene), "state_tracks")
+    assert [row["track_status"] for row in found].count("deleted") == 1
+    assert (found[-1]["track_status"], found[-1]["time_s"]) == ("deleted", 4.5)
+
+
 def test_what_does_not_come_over_a_wire_ends_too():
     """A file of detections that stops, and a wire that loses all: nothing wakes the tracker."""
     scene = silent(duration_s=20, delete_after_s=3)

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from covering import covers
 
+from components.foreign.fmu.message_columns import message_column
+from components.foreign.signals import Signals
 from dsa_des.errors import BlockFailure, SceneError, SetupFailure
 from tests import warm_process
 from tests.support.waiting import wait_for
@@ -511,3 +513,14 @@ def test_what_has_no_solver_is_refused(lab, lag):
             new.writestr(name, old.read(name).replace(b"<CoSimulation", b"<ModelExchange"))
     scene = lab.write({"b": f'foreign.fmu; file = "{other}"; scan_rate_hz = 1'}, [])
     assert "made for model exchange only" in str(lab.problems(scene)[0])
+
+
+def test_a_signal_is_that_of_its_name_and_of_its_place_in_an_array():
+    layout, values = [(0, 0), (1, 1), (1, 2)], np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    given = Signals.of_rows(
+        np.array([0, 10]), layout, values, [""] * 6, ("lag", "state"), ("s", "m")
+    )
+    assert message_column(given, "lag", None, "inputs").tolist() == [1.0, 4.0]
+    assert message_column(given, "state", "2", "inputs").tolist() == [3.0, 6.0]
+    with pytest.raises(ValueError, match="inputs: there is no signal 'stat'; did you mean 'state'"):
+        message_column(given, "stat", None, "inputs")

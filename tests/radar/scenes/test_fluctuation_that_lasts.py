@@ -9,7 +9,7 @@ import pytest
 from covering import covers
 from scipy.special import gammaincc
 from scipy.stats import gamma, kstest, ncx2, norm
-from wired import HEARS_ALL, chain, decided, run
+from wired import HEARS_ALL, chain, decided, rows, run
 
 from components.radar.detection import detection_probability
 from components.radar.rcs import Scatterers, fading_power
@@ -187,21 +187,28 @@ def test_who_is_seen_from_one_side_does_not_scintillate():
     assert still == pytest.approx(np.broadcast_to(still[0], still.shape), abs=0.03, nan_ok=True)
 
 
-def test_echoes_of_targets_with_models_of_their_own_scintillate_as_if_alone():
+@pytest.mark.parametrize("extent_m", [5.0, None], ids=["lasting", "new at each look"])
+def test_echoes_of_targets_with_models_of_their_own_are_as_if_alone(extent_m):
     """Who flies beside whom, and fluctuates how, changes nobody's echo."""
     targets = [
         {**target, "swerling": model, "yaw_deg": 31.0 + 40.0 * number}
         for number, (target, model) in enumerate(zip(formation(4), (3, 1, 0, 3), strict=True))
     ]
     each = {key: value for key, value in RADAR.items() if key != "swerling"}
-    radar = {**each, **LOUD, "scan_rate_hz": 1, "scintillation_extent_m": 5.0}
+    radar = {**each, **LOUD, "scan_rate_hz": 1}
+    if extent_m is not None:
+        radar["scintillation_extent_m"] = extent_m
 
-    def seen(some: list[dict[str, Any]]) -> dict[str, float]:
-        scene = chain({"sensor": radar}, targets=some, duration_s=0.5)
-        return {row["target"]: row["snr_db"] for row in decided(run(scene))}
+    def seen(some: list[dict[str, Any]]) -> dict[str, list[float]]:
+        found = run(chain({"sensor": radar}, targets=some, duration_s=0.5))
+        both = decided(found), rows(found, "detections")  # in the mean, and as it came out
+        return {
+            name: [row["snr_db"] for each in both for row in each if row["target"] == name]
+            for name in (target["name"] for target in some)
+        }
 
     together = seen(targets)
-    assert len(together) == 4
+    assert [len(both) for both in together.values()] == [2] * 4
     for target in targets:
         assert seen([target]) == {target["name"]: together[target["name"]]}
 
