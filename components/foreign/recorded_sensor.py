@@ -15,6 +15,7 @@ from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import known_targets
 from components.foreign.reported_look import reported_looks
 from components.formats.measurement_file import Measurements, read_measurements
+from components.formats.recorded.known_kinds import captured_asterix
 from components.messages.columns import OWN_VELOCITY, POSE
 from components.messages.detections import EXTRAS, Detections, SensorOffer, promises_of_looks
 from components.messages.targets import RelativeTargets
@@ -33,6 +34,8 @@ from dsa_des.time.clock import ClockSpec
 
 _FLAGS = ("declared", "cued")
 _DEG = math.radians(1.0)
+#: Endings of files with plots of radars, plain or captured.
+_RADARS = (".ast", ".pcap", ".pcapng", ".cap")
 _VARIANCES = (
     "azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2",
     "range_rate_variance_m2_s2",
@@ -46,7 +49,7 @@ class RecordedSensorParameters(Parameters):
         description="Parquet or CSV file with time_s, azimuth_rad and elevation_rad of every "
         "detection (body axes), and what else of a run's detections.parquet there is; arrival_s "
         "says when it came. A row without angles is a look that saw nothing. Or a run's folder, "
-        "or plots in ASTERIX (.ast), whose angles are from north and level."
+        "or plots in ASTERIX (.ast, .pcap, .pcapng), whose angles are from north and level."
     )
     block: str | None = Field(
         None, description="Whose rows are read, where the file has a column block."
@@ -90,7 +93,7 @@ class RecordedSensorParameters(Parameters):
 
     def without_effect(self) -> list[str]:
         """Say which keys change nothing."""
-        if self.place is None or self.file.suffix == ".ast":
+        if self.place is None or self.file.suffix in _RADARS:
             return []
         keys = ("radar_lat_deg", "radar_lon_deg", "radar_alt_m")
         return self.idle(*keys, because="the file is no ASTERIX")
@@ -118,7 +121,9 @@ class RecordedSensor(Component):
 
     @cached_property
     def _measured(self) -> Measurements:
-        measured = read_measurements(self.p.file, self.p.block, self.p.place)
+        measured = read_measurements(
+            self.p.file, self.p.block, self.p.place, captured_asterix(self.p.file)
+        )
         p, entries = self.p, measured.entries
         stated = (p.azimuth_error_deg, p.elevation_error_deg, p.range_error_m)
         for name, error, unit in zip(_VARIANCES[:3], stated, (_DEG, _DEG, 1.0), strict=True):

@@ -155,7 +155,9 @@ _OWNSHIP = "OWNSHIP"
 
 
 def read_asterix_plots(
-    path: str | PathLike[str], place: tuple[float, float, float] | None = None
+    path: str | PathLike[str],
+    place: tuple[float, float, float] | None = None,
+    data: bytes | None = None,
 ) -> RadarPlots:
     """Read the plots of radars (048) in an ASTERIX file, with their north markers (034).
 
@@ -169,6 +171,8 @@ def read_asterix_plots(
     path : path-like
     place : (latitude, longitude, altitude), optional
         Where radars are of which the file does not say it: degrees, m above the ellipsoid.
+    data : bytes, optional
+        Its data blocks, where they are within something else.
 
     Returns
     -------
@@ -182,7 +186,7 @@ def read_asterix_plots(
         The extra ``asterix`` is not installed.
     """
     try:
-        data = read_input_bytes(Path(path))
+        data = read_input_bytes(Path(path)) if data is None else data
     except InputFileError as error:
         raise TrafficFileError(str(path), [str(error)]) from None
     records, notes = _records(Path(path), data)

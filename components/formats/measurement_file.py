@@ -88,17 +88,20 @@ class _Table:
 
 
 def read_measurements(
-    path: Path, block: str | None = None, place: tuple[float, float, float] | None = None
+    path: Path,
+    block: str | None = None,
+    place: tuple[float, float, float] | None = None,
+    asterix: bytes | None = None,
 ) -> Measurements:
     """Return the looks of a sensor; ValueError says all that is wrong, with its line or row.
 
     The file is ``.parquet`` or CSV; the folder of a run, whose ``scans.parquet`` then says empty
     looks and the ownship's pose; or ASTERIX (``.ast``), whose angles are from north and level.
     `block` says whose rows are read, where there are several, and `place` where a radar of ASTERIX
-    is (degrees, m) that does not say it.
+    is (degrees, m) that does not say it; `asterix` are its data blocks, of a file that holds more.
     """
-    if path.suffix == ".ast":
-        return _of_asterix(path, block, place)
+    if path.suffix == ".ast" or asterix is not None:
+        return _of_asterix(path, block, place, asterix)
     if not is_folder(path):
         table = _read(path, _NEEDED, block)
         _check(table)
@@ -111,12 +114,15 @@ def read_measurements(
 
 
 def _of_asterix(
-    path: Path, radar: str | None, place: tuple[float, float, float] | None
+    path: Path,
+    radar: str | None,
+    place: tuple[float, float, float] | None,
+    asterix: bytes | None,
 ) -> Measurements:
     """Return the plots of one radar, which stands level and looks north."""
     from components.formats.asterix_file import read_asterix_plots
 
-    problems, plots = Problems(str(path)), read_asterix_plots(path, place)
+    problems, plots = Problems(str(path)), read_asterix_plots(path, place, asterix)
     if radar is None and len(plots.radars) > 1:
         problems.fail(f"holds plots of {', '.join(plots.radars)}: the key block must name one")
     if radar is not None and radar not in plots.radars:

@@ -8,6 +8,7 @@
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from itertools import chain
@@ -15,7 +16,7 @@ from typing import Any
 
 from components.arguments.units import FOOT_M, KNOT_M_S
 from components.formats.reports import Log, Report
-from components.formats.text_rows import Problems, lines_of
+from components.formats.text_rows import Problems, each_line, text_of
 
 _FPM = FOOT_M / 60.0
 #: How old a velocity message of SBS may be beside a position, s.
@@ -53,21 +54,23 @@ UNKNOWN_JSON = (
 
 def json_documents(problems: Problems, data: bytes) -> Iterator[tuple[int, Any]]:
     """Give a JSON document, or those of all lines, with the lines in which they begin."""
-    lines = lines_of(data, problems)
+    lines = each_line(text_of(data, problems))
+    begins, line = next(lines, (1, ""))
+    try:
+        yield begins, json.loads(line)
+    except (ValueError, RecursionError):
+        try:
+            yield 1, json.loads(data)
+        except (ValueError, RecursionError) as error:
+            problems.fail(f"is no JSON that can be read: {error}", line=begins)
+        return
+    del data  # of a long history it is not held beside its text
     for number, line in lines:
         try:
             document = json.loads(line)
         except (ValueError, RecursionError) as error:
-            if number != lines[0][0]:
-                problems.fail(f"is no JSON that can be read: {error}", line=number)
-            break
+            problems.fail(f"is no JSON that can be read: {error}", line=number)
         yield number, document
-    else:
-        return
-    try:
-        yield 1, json.loads(data)
-    except (ValueError, RecursionError) as error:
-        problems.fail(f"is no JSON that can be read: {error}", line=lines[0][0])
 
 
 _Reader = Callable[[Mapping[str, Any], dict[str, str]], Iterator[Report]]
@@ -136,6 +139,11 @@ def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[
         )  # fmt: skip
 
 
+def _of_interface(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Report]:
+    """Give the aircraft that ADS-B Exchange and others answer with: as readsb's, the time in ms."""
+    yield from _of_aircraft({"now": one["now"] / 1000.0, "aircraft": one["ac"]}, callsigns)
+
+
 #: Of a trace's flags: its altitude is geometric.
 _GEOMETRIC = 8
 
@@ -170,6 +178,7 @@ def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Re
 _FEET = "ft and kt"
 _JSON: tuple[tuple[frozenset[str], str, str, _Reader], ...] = (
     (frozenset({"now", "aircraft"}), "aircraft.json of readsb", _FEET, _of_aircraft),
+    (frozenset({"now", "ac"}), "aircraft of ADS-B Exchange's interface", _FEET, _of_interface),
     (frozenset({"icao", "timestamp", "trace"}), "a trace of readsb", _FEET, _of_trace),
     (frozenset({"time", "states"}), "OpenSky's states", "m and m/s", _of_states),
 )
@@ -178,18 +187,25 @@ _JSON: tuple[tuple[frozenset[str], str, str, _Reader], ...] = (
 def _of_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Reports:
     """Join the messages of each aircraft: positions with the last velocity, if it is recent."""
     moves: dict[str, tuple[float, tuple[Any, ...]]] = {}
-    for number, line in lines_of(data, problems):
-        cells = [cell.strip() for cell in line.split(",")]
-        if cells[0] != "MSG" or len(cells) < 17 or not cells[4]:
+    lines = each_line(text_of(data, problems))
+    del data
+    days: dict[str, float | None] = {}
+    for number, line in lines:
+        if not line.startswith("MSG"):
             continue
-        name, callsign = cells[4], cells[10]
-        if callsign:
+        cells = line.split(",")
+        if len(cells) < 17 or not (name := cells[4].strip()):
+            continue
+        if callsign := cells[10].strip():
             callsigns[name] = callsign
-        time_s = _instant(cells[6], cells[7])
+        date = cells[6]
+        if date not in days:
+            days[date] = _midnight(date)
+        time_s = _instant(days[date], cells[7])
         if time_s is None:
-            problems.add(f"{cells[6]} {cells[7]} is no date and time", line=number)
+            problems.add(f"{date.strip()} {cells[7].strip()} is no date and time", line=number)
             continue
-        alt, gs, trk, lat, lon, climb = (_number(cell) for cell in cells[11:17])
+        alt, gs, trk, lat, lon, climb = map(_number, cells[11:17])
         if gs is not None and trk is not None:
             moves[name] = time_s, (trk, gs * KNOT_M_S, _times(climb, _FPM))
         if lat is None or lon is None:
@@ -199,16 +215,26 @@ def _of_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Repor
         yield number, Report(name, time_s, lat, lon, None, _times(alt, FOOT_M), *recent)
 
 
-def _instant(date: str, clock: str) -> float | None:
+def _midnight(date: str) -> float | None:
     try:
-        when = datetime.fromisoformat(f"{date.replace('/', '-')} {clock}")
+        day = datetime.fromisoformat(date.strip().replace("/", "-"))
     except ValueError:
         return None
-    return when.replace(tzinfo=UTC).timestamp()
+    return day.replace(tzinfo=UTC).timestamp()
+
+
+_CLOCK = re.compile(r"\s*(\d\d):(\d\d):(\d\d(?:\.\d*)?)\s*")
+
+
+def _instant(midnight_s: float | None, clock: str) -> float | None:
+    match = _CLOCK.fullmatch(clock)
+    if match is None or midnight_s is None:
+        return None
+    return midnight_s + 3600.0 * int(match[1]) + 60.0 * int(match[2]) + float(match[3])
 
 
 def _number(cell: str) -> float | None:
     try:
-        return float(cell)
+        return float(cell) if cell else None
     except ValueError:
         return None

@@ -271,8 +271,8 @@ class AnswerReport:
             f"at {each:.4g} % (Bonferroni). Each model stands alone for the scene's own: two of "
             "them together were not run.",
             "CPU: by that of the scene as it is in the same turn, median of "
-            f"{turns:,} turns ± half the distance between the quartiles. Front: no other is both "
-            "as cheap and surely as near.",
+            f"{turns:,} turn{'s' * (turns > 1)} ± half the distance between the quartiles. Front: "
+            "no other is both as cheap and surely as near.",
         ]
         if self.own:
             lines.append(f"The scene as it is: {', '.join(self.own)}.")

@@ -15,6 +15,7 @@ from dsa_des.costs.climb import on_front
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.results.labels import signed, unit_of
 from dsa_des.results.record import FRACTION, NUMBER, Result
+from dsa_des.results.statistics import FEW
 
 _LIMIT = re.compile(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S*)\s*")
 #: A share of the scene's own answer, where no limit is given.
@@ -159,6 +160,8 @@ def _wanted(change: PairedChange, limit: float) -> float:
     more = (change.half_width / room) ** power if room > 0.0 else math.inf
     if change.events < FEW_EVENTS:
         more = max(more, FEW_EVENTS / change.events if change.events else math.inf)
+    elif change.difference.few:
+        more = max(more, FEW / change.difference.count)
     elif lost and more <= 1.0:
         return math.nan  # of more of them more lose their value
     if not more <= _MOST_TIMES:

@@ -90,6 +90,27 @@ def test_a_change_is_the_paired_difference_of_two_studies(study, made, tmp_path,
     assert (row["low"], row["high"]) == pytest.approx(by_hand, rel=1e-6)
 
 
+def test_changes_agree_with_two_independent_long_runs(study, made, tmp_path):
+    """Other seeds on either side, five times as many runs: nothing is paired, all is plain."""
+    sides = []
+    for seed, change in ((101, []), (202, ["--set", "set.blocks.radar.scan_rate_hz=2"])):
+        folder = tmp_path / str(seed)
+        done = call("study", study, *change, "--seed", seed, "--replicas", "60", "--workers", "1",
+                    "--no-figures", "--quiet", "--out", folder)  # fmt: skip
+        assert done.exit_code == 0, done.output
+        values = values_of(folder)
+        sides.append(values[~np.isnan(values)])
+    own, other = sides
+    change = other.mean() - own.mean()
+    error = math.hypot(stats.sem(own), stats.sem(other))
+    (row,) = [row for row in made[2]
+              if (row["model"], row["result"]) == ("radar.scan_rate_hz = 2", RANGE)]  # fmt: skip
+    half = 3.3 * error
+    assert row["low"] <= change + half and change - half <= row["high"]
+    paired = (row["high"] - row["low"]) / 2 / stats.t.ppf(1 - 0.05 / 24, row["pairs"] - 1)
+    assert abs(change - row["change"]) < 4 * math.hypot(error, paired)
+
+
 def test_it_is_printed_what_the_files_hold(made):
     done, out, rows = made
     assert sorted(path.name for path in out.iterdir()) == [

@@ -110,6 +110,8 @@ def test_few_events_decide_nothing():
     few = change(-0.01, 0.01, result=RISK, own=0.1, few=True, events=5.0)
     verdict = kind_of(few, limit=Limit(0.1, False), result=RISK)
     assert (verdict.kind, verdict.wanted) == (OPEN, 400.0)  # until 20 are seen
+    # Two runs that agree tell nothing; ten would be enough for an interval.
+    assert kind_of(change(0.0, 0.0, count=2, differing=0, few=True)).wanted == 10.0
     none = change(-0.01, 0.01, result=RISK, own=0.1, few=True, events=0.0)
     assert kind_of(none, limit=Limit(0.1, False), result=RISK).wanted == math.inf
 

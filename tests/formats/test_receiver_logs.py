@@ -72,6 +72,14 @@ def test_one_snapshot_and_which_altitude(tmp_path):
     assert read(tmp_path, HISTORY[-1], ownship="b2").ownship.name == "b2"
 
 
+def test_the_interface_of_services_counts_in_milliseconds(tmp_path):
+    answer = {"ac": HISTORY[0]["aircraft"], "now": 1700000000000, "total": 3, "msg": "No error"}
+    file = read(tmp_path, answer)
+    assert [craft.name for craft in file.aircraft] == ["a1", "b2"]
+    assert file.start_time_s == 1699999999.5
+    assert file.ownship.alt_m.tolist() == pytest.approx([3000 * FOOT])
+
+
 def test_a_trace_is_one_aircraft(tmp_path):
     trace = {
         "icao": "3c6444", "r": "D-TEST", "timestamp": 1700000000.0,

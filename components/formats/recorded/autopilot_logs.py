@@ -7,6 +7,7 @@ import binascii
 import math
 import struct
 from collections.abc import Iterator, Mapping
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -37,13 +38,16 @@ def ulog_log(problems: Problems, data: bytes, stem: str) -> Log:
     warnings: list[str] = []
     topics = read_topics(problems, data, [*_POSITIONS, *_OTHERS], warnings)
     callsigns: dict[str, str] = {}
-    try:
-        with np.errstate(all="ignore"):
-            reports = [*_own_of_ulog(problems, topics, stem), *_heard_by_px4(topics, callsigns)]
-    except (KeyError, IndexError, TypeError) as error:
-        problems.fail(f"its topics are not as PX4 writes them ({type(error).__name__}: {error})")
-    numbered = iter(list(enumerate(reports, start=1)))
-    return Log("a PX4 log (ULog)", "m and m/s", numbered, callsigns, "samples", warnings)
+
+    def each() -> Iterator[tuple[int, Report]]:
+        own, heard = _own_of_ulog(problems, topics, stem), _heard_by_px4(topics, callsigns)
+        try:
+            yield from enumerate(chain(own, heard), start=1)
+        except (KeyError, IndexError, TypeError) as error:
+            what = f"{type(error).__name__}: {error}"
+            problems.fail(f"its topics are not as PX4 writes them ({what})")
+
+    return Log("a PX4 log (ULog)", "m and m/s", each(), callsigns, "samples", warnings)
 
 
 def _utc_less_boot_s(topics: Mapping[str, Topic]) -> float:
@@ -61,6 +65,11 @@ def _own_of_ulog(problems: Problems, topics: Mapping[str, Topic], stem: str) -> 
     name = next((name for name in _POSITIONS if len(topics.get(name, {}).get("timestamp", ()))), "")
     if not name:
         problems.fail(f"holds no position: one of the topics {', '.join(_POSITIONS)} is needed")
+    with np.errstate(all="ignore"):
+        yield from _own_samples(topics, name, stem)
+
+
+def _own_samples(topics: Mapping[str, Topic], name: str, stem: str) -> Iterator[Report]:
     own = {key: np.asarray(values, float) for key, values in topics[name].items()}
     boot_s = own["timestamp"] / 1e6
     if "latitude_deg" in own:

@@ -86,6 +86,7 @@ def record(
         return record_asterix(problems, data, altitude)
     log = _log_of(problems, data, stem)
     if log is not None:
+        del data  # its reader holds what it needs of it
         return recording_of(problems, log, None, altitude)
     if is_json(data):
         return record_json(problems, data, None, altitude, stem)
@@ -153,17 +154,32 @@ def _is_asterix(data: bytes) -> bool:
     return at > 0
 
 
-def _of_capture(problems: Problems, data: bytes, altitude: Altitude | None) -> Recording:
-    """Return the aircraft of the datagrams of a capture that are ASTERIX, on the capture's day."""
+def captured_asterix(path: Path) -> bytes | None:
+    """Return the data blocks of ASTERIX in a capture; None of a file that is none."""
+    if path.suffix.lower() not in _CAPTURES:
+        return None
+    problems = Problems(str(path))
+    _, blocks, _ = _blocks_of(problems, read_content(path, problems))
+    return blocks
+
+
+_CAPTURES = (".pcap", ".pcapng", ".cap")
+
+
+def _blocks_of(problems: Problems, data: bytes) -> tuple[float, bytes, int]:
+    """Return when the first datagram with ASTERIX was captured, all of it, and how many others."""
     sent = udp_payloads(problems, data)
     blocks = [(time_s, payload) for time_s, payload in sent if _is_asterix(payload)]
     if not blocks:
         problems.fail(f"none of {len(sent)} datagrams of the capture is ASTERIX")
-    recording = record_asterix(
-        problems, b"".join(payload for _, payload in blocks), altitude, of_day_s=blocks[0][0]
-    )
-    if len(blocks) < len(sent):
-        other = len(sent) - len(blocks)
+    return blocks[0][0], b"".join(payload for _, payload in blocks), len(sent) - len(blocks)
+
+
+def _of_capture(problems: Problems, data: bytes, altitude: Altitude | None) -> Recording:
+    """Return the aircraft of the datagrams of a capture that are ASTERIX, on the capture's day."""
+    first_s, blocks, other = _blocks_of(problems, data)
+    recording = record_asterix(problems, blocks, altitude, of_day_s=first_s)
+    if other:
         recording.notes.warnings.append(f"{other} datagrams are no ASTERIX and were left out")
     return recording
 

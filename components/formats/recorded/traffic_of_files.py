@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
+
 from components.formats.recorded.known_kinds import record
 from components.formats.recorded.selection import (
     led_by,
@@ -19,6 +21,7 @@ from components.formats.recorded.selection import (
 from components.formats.recording import Recording, Samples
 from components.formats.sample_columns import Altitude
 from components.formats.text_rows import TrafficFile
+from components.geometry import slant_range_m
 
 _EVERYWHERE = (-90.0, 90.0, -180.0, 180.0)
 
@@ -96,6 +99,8 @@ def read_traffic(paths: Sequence[Path], choice: Choice) -> TrafficFile:
     for name, columns in own.items():
         own[name] = within_time(columns, begin_s, end_s) or columns
     file = replace(whole, samples=own | kept).flights(choice.longest_gap_s, begin_s)
+    if own:
+        _note_itself(file)
     return file if math.isinf(end_s) else replace(file, end_s=end_s - begin_s)
 
 
@@ -157,6 +162,29 @@ def _none_is_there(
         f"heights that are chosen: the files hold {clock(first_s)} to {clock(last_s)}; from_s and "
         "to_s, or own_starts_s, choose another time"
     )
+
+
+#: Who stays nearer to the ownship than this, at so many of its samples, is the ownship itself.
+_ITSELF_M, _OFTEN = 150.0, 10
+
+
+def _note_itself(file: TrafficFile) -> None:
+    """Warn of an intruder that is where the ownship is: its own transponder, as it was heard."""
+    own = file.ownship
+    for craft in file.intruders:
+        there = craft.at(own.sample_times_s)
+        here = there.present
+        if np.count_nonzero(here) < _OFTEN:
+            continue
+        apart = slant_range_m(
+            own.lat_deg[here], own.lon_deg[here], own.alt_m[here], there.lat_deg[here],
+            there.lon_deg[here], own.alt_m[here],
+        )  # fmt: skip
+        if (median := float(np.median(apart))) < _ITSELF_M:
+            file.warnings.append(
+                f"{craft.name} stays within {median:.0f} m of the ownship {own.name}: if it is its "
+                f"own transponder, without = [{craft.name!r}] leaves it out"
+            )
 
 
 #: Clocks that read more count from 1970.

@@ -26,6 +26,7 @@ class AskedStudy:
     sets: tuple[str, ...] = ()
     listed: tuple[str, ...] = ()
     budgets: tuple[str, ...] = ()
+    block: str | None = None
 
     def command(self) -> str:
         """Return the command that gives its tables."""
@@ -33,7 +34,7 @@ class AskedStudy:
         for option, values in (("answer", self.answers), ("set", self.sets), ("vary", self.listed),
                                ("budget", self.budgets)):  # fmt: skip
             words += [word for value in values for word in (f"--{option}", value)]
-        return shell_line(words)
+        return shell_line([*words, *(("--block", self.block) if self.block else ())])
 
 
 STUDIES = (
@@ -59,7 +60,7 @@ def reports(workers: int, studies: Sequence[AskedStudy] = STUDIES) -> list[Answe
     made = []
     for asked in studies:
         study = read_study(chosen_file(asked.study, "study"), sets=asked.sets)
-        answer = AnswerOfStudy(study, asked.answers, None, asked.listed, asked.budgets)
+        answer = AnswerOfStudy(study, asked.answers, asked.block, asked.listed, asked.budgets)
         with tempfile.TemporaryDirectory() as folder:
             if answer.run(Path(folder) / "study", workers, CostProgress(silent=False)):
                 raise KeyboardInterrupt

@@ -10,8 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 import recorded_files as write
 
-from components.formats.asterix_records import ADS_B, AsterixRecord, write_records
-from components.formats.recorded.known_kinds import record
+from components.formats.asterix_records import ADS_B, PLOTS, AsterixRecord, write_records
+from components.formats.measurement_file import read_measurements
+from components.formats.recorded.known_kinds import captured_asterix, record
 from components.formats.text_rows import TrafficFileError
 
 START = 1_717_243_200
@@ -129,6 +130,28 @@ def test_asterix_is_read_out_of_captures_with_their_day(tmp_path, make):
     assert one["lat"] == pytest.approx(47.0 + 0.001 * np.arange(5), abs=1e-6)
     assert one["alt"] == pytest.approx([1524.0] * 5)
     assert found.notes.warnings == ["1 datagrams are no ASTERIX and were left out"]
+
+
+def test_plots_of_a_radar_are_read_out_of_a_capture(tmp_path):
+    """The same as from its data blocks alone; where it stands a scene says."""
+    pytest.importorskip("asterix", reason="needs asterix")
+    blocks = [
+        write_records([AsterixRecord(PLOTS, 100.0 + 4 * k, {
+            "sac": 1, "sic": 2, "range_m": 30_000.0 + 100 * k, "azimuth_deg": 40.0,
+            "alt_m": 1524.0,
+        })])
+        for k in range(3)
+    ]  # fmt: skip
+    plain, captured = tmp_path / "a.ast", tmp_path / "a.pcap"
+    plain.write_bytes(b"".join(blocks))
+    captured.write_bytes(write.pcap([(START + k, block) for k, block in enumerate(blocks)]))
+    place = 47.0, 8.0, 500.0
+    one = read_measurements(plain, None, place)
+    other = read_measurements(captured, None, place, captured_asterix(captured))
+    for name, values in one.entries.items():
+        assert other.entries[name].tolist() == values.tolist()
+    assert other.entries["range_m"] == pytest.approx([30_000, 30_100, 30_200], abs=4)
+    assert captured_asterix(plain) is None
 
 
 KINDS = {

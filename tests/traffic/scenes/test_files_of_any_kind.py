@@ -245,6 +245,15 @@ def test_the_closest_approach_is_that_of_flights_that_are_there(tmp_path):
     assert found[None] == {"time_s": 40.0, "range_m": pytest.approx(metres, rel=1e-3)}
 
 
+def test_an_own_transponder_among_the_others_is_noticed(tmp_path):
+    """Heard 200 m higher, as pressure has it, and a little beside."""
+    own = gpx(tmp_path, "mine.gpx", me=flight())
+    heard = gpx(tmp_path, itself=flight(lat=47.0002, alt=1200.0), other=flight(lat=47.003))
+    (said,) = [w for w in traffic([heard], own_file=str(own)).content.warnings if "itself" in w]
+    assert said.startswith("itself stays within 22 m of the ownship me: if it is its own")
+    assert traffic([heard], own_file=str(own), without=["itself"]).roster.names == ("other",)
+
+
 @covers("without", of=NAMES)
 def test_an_aircraft_is_left_out(tmp_path):
     path = gpx(tmp_path, a=flight(), b=flight(lat=47.1), c=flight(lat=47.2))
