@@ -269,7 +269,8 @@ class SplitEvent(Metric):
         return [
             Result(name, NUMBER, f"probability by splitting: {of.get(name, name)}",
                    least=0.0, most=1.0, unseen=f"{name}.unseen"),
-            Result(f"{name}.unseen", NUMBER, "what one run more that comes to it would add"),
+            Result(f"{name}.unseen", NUMBER, "what one run more that comes to it would add",
+                   least=0.0),
             Result(f"{name}.collapsed", EVENT, "no run came to it: its P is 0, and counts"),
             Result(f"{name}.runs", NUMBER, "runs that were flown", least=0.0),
             Result(f"{name}.levels", CLASS, "levels of the score"),

@@ -149,7 +149,7 @@ def test_plots_of_a_radar_are_read_out_of_a_capture(tmp_path):
     one = read_measurements(plain, None, place)
     other = read_measurements(captured, None, place, captured_asterix(captured))
     for name, values in one.entries.items():
-        assert other.entries[name].tolist() == values.tolist()
+        np.testing.assert_array_equal(other.entries[name], values)
     assert other.entries["range_m"] == pytest.approx([30_000, 30_100, 30_200], abs=4)
     assert captured_asterix(plain) is None
 
