@@ -114,7 +114,7 @@ def _spread(duration_s: float, targets: int) -> tuple[FloatArray, float]:
     count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, targets))
     intervals = max(1, math.ceil(count))
     half_s = 0.5 * duration_s / intervals
-    times: FloatArray = (np.arange(intervals) + 0.5) * (2.0 * half_s)
+    times = (np.arange(intervals, dtype=np.float64) + 0.5) * (2.0 * half_s)
     return times, half_s
 
 
