@@ -27,8 +27,10 @@ class KnownTraffic:
 
     def envelope(self, reach_m: float, lasts_s: float) -> Any:
         """Return the run's envelope for a reach, or None."""
+        if self._envelope is None:  # of no replica
+            return None
         self._asked = True
-        return None if self._envelope is None else self._envelope(reach_m, lasts_s)
+        return self._envelope(reach_m, lasts_s)
 
     def __eq__(self, other: object) -> bool:
         return self is other or (

@@ -21,7 +21,8 @@ from components.geometry import (
     line_of_sight,
     wrap_by_sines,
 )
-from components.messages.reach import REACH_MARGIN
+from components.geometry.error_bounds import true_reach_m
+from components.messages.reach import REACH_MARGIN, FarthestLook
 from components.terrain.raster import ElevationRaster
 from dsa_des.arrays.types import FloatArray
 
@@ -58,10 +59,7 @@ class TrafficEnvelope:
 
 def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) -> TrafficEnvelope:
     """Bound a run's lines of sight up to a reach."""
-    count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, len(fleet)))
-    intervals = max(1, math.ceil(count))
-    half_s = 0.5 * duration_s / intervals
-    times = (np.arange(intervals) + 0.5) * (2.0 * half_s)
+    times, half_s = _spread(duration_s, len(fleet))
     own_state, states = own.at(times), fleet.at(times)
     own_moves = _moves_m(own.max_speed_mps, half_s)
     moves = _moves_m(fleet.max_speeds_mps, half_s)
@@ -76,14 +74,7 @@ def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) 
     )
     apart = moves + own_moves
     near = range_m - apart <= REACH_MARGIN * reach_m
-    lowest = float(own_state.alt_m.min()) - own_moves
-    # The normal turns fastest along the equator's meridian.
-    turns = own_moves / (SEMI_MAJOR_AXIS_M * (1.0 - ECCENTRICITY_SQUARED) + lowest)
-    lat, alt = own_state.lat_deg, (lowest, float(own_state.alt_m.max()) + own_moves)
-    latitudes = (
-        max(-90.0, float(lat.min()) - math.degrees(turns)),
-        min(90.0, float(lat.max()) + math.degrees(turns)),
-    )
+    latitudes, alt, turns = _place(own_state, own_moves)
     pitch, roll = attitude_extremes_rad(own)
     if not near.any():
         return TrafficEnvelope(0.0, latitudes, alt, alt, 0.0, pitch, roll)
@@ -99,6 +90,46 @@ def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) 
         pitch,
         roll,
     )
+
+
+def true_reaches_m(own: Fleet, targets: int, duration_s: float, look: FarthestLook) -> FloatArray:
+    """Return, for the ownship of each run, how far targets are at most that a look may meet.
+
+    That is its range, or what ranges by models of the Earth may truly be where this ownship flies;
+    `targets` is how many there are in a run.
+    """
+    reaches_m: FloatArray = np.full(len(own), look.range_m)
+    if look.seeming:
+        times, half_s = _spread(duration_s, targets)
+        for run, speed_mps in enumerate(own.max_speeds_mps.tolist()):
+            state = own.each(np.full(len(times), run), times)
+            latitudes, alt, _ = _place(state, _moves_m(speed_mps, half_s))
+            true_m = [true_reach_m(earth, m, latitudes, alt) for earth, m in look.seeming]
+            reaches_m[run] = max(look.range_m, *true_m)
+    return reaches_m
+
+
+def _spread(duration_s: float, targets: int) -> tuple[FloatArray, float]:
+    """Return times in the middle of as many equal parts as are affordable, and half of one."""
+    count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, targets))
+    intervals = max(1, math.ceil(count))
+    half_s = 0.5 * duration_s / intervals
+    times = (np.arange(intervals, dtype=np.float64) + 0.5) * (2.0 * half_s)
+    return times, half_s
+
+
+def _place(state: TrajectoryState, moves_m: float) -> tuple[Interval, Interval, float]:
+    """Return the latitudes in degrees and altitudes of an ownship that is so far at most from
+    where samples saw it, and by what angle its normal turns meanwhile.
+    """
+    lowest = float(state.alt_m.min()) - moves_m
+    # The normal turns fastest along the equator's meridian.
+    turns = moves_m / (SEMI_MAJOR_AXIS_M * (1.0 - ECCENTRICITY_SQUARED) + lowest)
+    latitudes = (
+        max(-90.0, float(state.lat_deg.min()) - math.degrees(turns)),
+        min(90.0, float(state.lat_deg.max()) + math.degrees(turns)),
+    )
+    return latitudes, (lowest, float(state.alt_m.max()) + moves_m), turns
 
 
 def attitude_extremes_rad(trajectory: Any) -> tuple[float, float]:

@@ -82,18 +82,24 @@ class NearIntervals:
         return int(np.cumsum(change[order]).max(initial=0))
 
 
-def near_intervals(own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> NearIntervals:
+def near_intervals(
+    own: Fleet, targets: Fleet, reach_m: float | FloatArray, end_s: float
+) -> NearIntervals:
     """Return when targets may be within a range of the ownship, between time 0 and an end.
 
     Every time at which a target is within `reach_m` lies in one of its intervals; they exceed the
     true ones by `FINEST_S` or less at each end (more only for a target that stays for long within a
     few metres of the edge). `own` is the ownship of each run; `targets` are as many in each run,
-    one run after the other.
+    one run after the other. The reach may be another one in each run; where it is infinite, all
+    its targets may be near all the time, as in a run of its own that asks for no intervals.
     """
     of_run = max(1, len(targets) // len(own))
     run = np.arange(len(targets)) // of_run
     own_s, targets_s = own.intervals_present_s[run], targets.intervals_present_s
     present_s = np.maximum(targets_s[:, 0], own_s[:, 0]), np.minimum(targets_s[:, 1], own_s[:, 1])
+    within_m = np.broadcast_to(reach_m, len(own))[run]
+    always = np.isinf(within_m)
+    present_s[0][always], present_s[1][always] = -np.inf, np.inf
     closing = (targets.max_speeds_mps + own.max_speeds_mps[run]) * _SPEED_MARGIN
     target = np.arange(len(closing))
     piece: FloatArray = np.zeros(len(closing))
@@ -107,9 +113,9 @@ def near_intervals(own: Fleet, targets: Fleet, reach_m: float, end_s: float) -> 
         range_m = slant_range_m(*(values for state in states for values in state.arrays()[:3]))
         drift = closing[target] * half + _RANGE_MARGIN_M
         there = (present_s[0][target] <= start + length) & (present_s[1][target] >= start)
-        maybe = there & (range_m <= reach_m + drift)
+        maybe = there & (range_m <= within_m[target] + drift)
         fine = length <= FINEST_S or _too_many(run[target], of_run)
-        settled = maybe & ((range_m <= reach_m - drift) | fine)
+        settled = maybe & ((range_m <= within_m[target] - drift) | fine)
         kept.append((target[settled], start[settled], start[settled] + length))
         cut = maybe & ~settled
         target, piece = np.repeat(target[cut], 2), np.repeat(2.0 * piece[cut], 2)

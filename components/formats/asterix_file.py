@@ -140,7 +140,12 @@ def record_asterix(
     for k, row in samples.items():
         table.add_row(k + 1, row)
     if not names:
-        problems.fail("there are no system tracks (062) and no ADS-B reports (021) in it")
+        plots = sum(record.category == PLOTS for record in records)
+        seen = (
+            f"; its {plots} plots of radars (048) are no aircraft yet: sensor.recorded reads them"
+            if plots else ""
+        )  # fmt: skip
+        problems.fail(f"there are no system tracks (062) and no ADS-B reports (021) in it{seen}")
     if ownship is None and _OWNSHIP in names.values():
         ownship = _OWNSHIP
     return table.recording(

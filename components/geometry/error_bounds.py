@@ -274,6 +274,9 @@ __all__ = [
 _EXACT = 4e-15
 _ROUNDING = 1e-13
 
+# A bound this large proves hardly anything.
+_LARGEST_RELATIVE_ERROR = 0.5
+
 
 @dataclass(frozen=True)
 class ErrorBound:
@@ -334,6 +337,24 @@ def error_bound(earth: str, envelope: Envelope, attitude: str = "exact") -> Erro
         relative * envelope.range_max_m,
         relative,
     )
+
+
+def true_reach_m(earth: str, reach_m: float, own_lat_deg: Interval, own_alt_m: Interval) -> float:
+    """Return a true range beyond which no target seems to be within a reach; infinite for none.
+
+    With a relative error e of the range, proven for all targets that seem to be in reach, these
+    are within R / (1 - e).
+    """
+    low_m, high_m = own_alt_m
+    envelope = Envelope(
+        range_max_m=reach_m,
+        own_lat_deg=own_lat_deg,
+        own_alt_m=own_alt_m,
+        # Every model takes the difference of altitudes as it is, and none is longer than the range.
+        target_alt_m=(low_m - reach_m, high_m + reach_m),
+    )
+    relative = error_bound(earth, envelope).relative_range
+    return reach_m / (1.0 - relative) if relative < _LARGEST_RELATIVE_ERROR else math.inf
 
 
 def attitude_error_rad(pitch_rad: float, roll_rad: float) -> float:

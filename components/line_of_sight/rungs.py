@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass, fields, replace
 from typing import Any
 
 from components.aircraft.known_targets import KnownTraffic
@@ -11,34 +11,14 @@ from components.geometry.error_bounds import Envelope, ErrorBound, error_bound
 from components.messages.reach import REACH_MARGIN, FarthestLook, farthest_look
 from dsa_des.block.component import Context
 
-# A bound this large proves hardly anything.
-_LARGEST_RELATIVE_ERROR = 0.5
 
-
-def true_reach_m(context: Context, earth: str, look: FarthestLook) -> float:
-    """Return a true range beyond which no target seems to be within the range of a look.
-
-    Traffic leaves far targets out by their true ranges; sensors go by those of the model.
-    With a relative error e of the range, proven for all targets that seem to be in reach, these
-    are within R / (1 - e).
-    """
-    reach_m = look.range_m
-    if earth == "ellipsoid" or reach_m == 0.0 or not math.isfinite(reach_m):
-        return reach_m
-    known = _known_traffic(context)
-    traffic = None if known is None else known.envelope(reach_m, look.lasts_s)
-    if traffic is None:
-        return math.inf
-    low_m, high_m = traffic.own_alt_m
-    envelope = Envelope(
-        range_max_m=reach_m,
-        own_lat_deg=traffic.own_lat_deg,
-        own_alt_m=traffic.own_alt_m,
-        # Every model takes the difference of altitudes as it is, and none is longer than the range.
-        target_alt_m=(low_m - reach_m, high_m + reach_m),
-    )
-    relative = error_bound(earth, envelope).relative_range
-    return reach_m / (1.0 - relative) if relative < _LARGEST_RELATIVE_ERROR else math.inf
+def seeming_look(context: Context, earth: str, look: FarthestLook) -> FarthestLook:
+    """Return what a look by a model of the Earth asks of the traffic, which goes by true ranges."""
+    if earth == REFERENCE[0] or look.range_m == 0.0 or not math.isfinite(look.range_m):
+        return look
+    if _known_traffic(context) is None:
+        return replace(look, range_m=math.inf)
+    return replace(look, range_m=0.0, seeming=((earth, look.range_m),))
 
 
 def _known_traffic(context: Context) -> KnownTraffic | None:

@@ -1,7 +1,6 @@
 """The ladders of the coordinate transform: the Earth's shape, the attitude, and bent rays."""
 
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
@@ -21,7 +20,7 @@ from components.line_of_sight.earth_effects import (
     HIDES,
     terrain_section,
 )
-from components.line_of_sight.rungs import REFERENCE, PickedModels, pick_rung, true_reach_m
+from components.line_of_sight.rungs import REFERENCE, PickedModels, pick_rung, seeming_look
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import RelativeTargets, TrafficStates
 from components.navigation.errors import OWNSHIP, NavigationErrors
@@ -196,10 +195,10 @@ class Transform(Component):
         self._line_of_sight = LineOfSight(self.rung.earth, self.rung.attitude)
 
     def request(self, port: str) -> FarthestLook:
-        """Ask for the targets that a sensor downstream may look at, by their true ranges."""
+        """Ask for the targets that a sensor downstream may look at, where they seem to be."""
         look = farthest_look(consumer.request for consumer in self.context.consumers)
         earth = REFERENCE[0] if self.rung is None else self.rung.earth
-        return replace(look, range_m=true_reach_m(self.context, earth, look))
+        return seeming_look(self.context, earth, look)
 
     def left_out(self) -> list[str]:
         """Say which models were picked, and why."""

@@ -117,6 +117,9 @@ class FarthestLook:
         How exactly the line of sight is needed, see `Reach`.
     lasts_s : float
         How long a look lasts: a sweeping beam meets targets where they are later in the scan.
+    seeming : tuple of (model, range)
+        Ranges in m up to which targets are looked at by where a model of the Earth puts them.
+        How far these truly are depends on the flight of the ownship, which the traffic knows.
     """
 
     range_m: float
@@ -124,6 +127,7 @@ class FarthestLook:
     range_slack: float = math.inf
     exact_because: str = ""
     lasts_s: float = 0.0
+    seeming: tuple[tuple[str, float], ...] = ()
 
 
 def farthest_look(requests: Iterable[object]) -> FarthestLook:
@@ -150,6 +154,7 @@ def farthest_look(requests: Iterable[object]) -> FarthestLook:
         min(look.range_slack for look in looks),
         next((look.exact_because for look in looks if look.exact_because), ""),
         max(look.lasts_s for look in looks),
+        tuple(sorted({one for look in looks for one in look.seeming})),
     )
 
 

@@ -20,6 +20,7 @@ from components.flights.bounds import (
     check_above_terrain,
     check_on_raster,
     traffic_envelope,
+    true_reaches_m,
 )
 from components.flights.closest_approach import (
     STEP_S,
@@ -136,10 +137,9 @@ class TrafficSource(Component):
         return None if rate is None else ClockSpec(rate, Fraction(0))
 
     def offer(self, port: str) -> KnownTraffic:
-        """Say what the targets are, and where they can be.
+        """Say what the targets are, and where they can be; to all blocks the same.
 
-        All blocks get the same offer: whether a block went by where the targets can be
-        must show when replicas compare what their traffic says.
+        Who went by where targets can be must show as replicas compare it.
         """
         if self._offered is None:
             envelope = None if self.context.producers else self._envelope
@@ -181,16 +181,19 @@ class TrafficSource(Component):
         #: The targets that were moved last, and their fleet.
         self._moved: tuple[IntArray, Fleet] = self._all_columns, self.targets
         self._epochs: SteeredCulling | None = None
-        reach_m, lasts_s = self._look.range_m, self._look.lasts_s
+        look, own, targets = self._look, flights.own, flights.targets
         culls = not self.context.simulate_everything and self.clock_of(self.p) is None
-        if not culls or not math.isfinite(reach_m):
+        if not culls or math.isinf(look.range_m):
             return
-        end_s = float(self.context.duration_s) + lasts_s
+        end_s = float(self.context.duration_s) + look.lasts_s
         if not self.context.producers:
-            intervals = near_intervals(flights.own, flights.targets, reach_m, end_s)
-            self._flown = replace(self._flown, intervals=intervals)
-        elif lasts_s == 0.0:
-            self._epochs = SteeredCulling(flights.own, flights.targets, reach_m, end_s)
+            self._reach_m = true_reaches_m(own, len(self.roster), end_s, look)
+            if not np.isinf(self._reach_m).all():
+                near = near_intervals(own, targets, self._reach_m, end_s)
+                self._flown = replace(self._flown, intervals=near)
+        elif look.lasts_s == 0.0 and not look.seeming:  # a steered ownship may come anywhere
+            self._reach_m = np.array([look.range_m])
+            self._epochs = SteeredCulling(own, targets, look.range_m, end_s)
 
     def _check_terrain(self, own_at: FlightAt) -> None:
         """Refuse terrain that an ownship does not fly above."""
@@ -209,8 +212,7 @@ class TrafficSource(Component):
     ) -> "TrafficSource | None":
         """Return what flies the flights of all runs."""
         # Where the line of sight was chosen by where the traffic is, each replica chooses.
-        asked = self._offered is not None and self._offered.asked
-        if asked:
+        if self._offered is not None and self._offered.asked:
             return None
         self.prepare(parameters)
         flights = self.flights_of_runs(parameters, make)
@@ -249,19 +251,18 @@ class TrafficSource(Component):
         """Say how far targets matter."""
         if self._flown.intervals is None and self._epochs is None:
             return []
-        reach_km = self._look.range_m / 1000.0
+        reach_km = self._reach_m[0] / 1000.0
         return [f"targets beyond {reach_km:.2f} km: not moved, no sensor looks farther"]
 
     def run(self, wake: Wake) -> Message:
         """Return the state of all aircraft that may matter, at every instant."""
         # Flights that all runs share are those of one.
-        run = no_runs(len(wake)) if len(self._flown.own) == 1 else wake.run
+        run = wake.run if len(self._flown.own) > 1 else no_runs(len(wake))
         time_s = wake.time_s
         known = self._steer(wake, run)
         own, columns, near = self._near(run, time_s)
-        states = self._targets_at(run, columns, time_s)
+        states, culled = self._targets_at(run, columns, time_s), None
         present = states.present & own.present[:, np.newaxis]
-        culled = None
         if near is not None:
             present &= near
             culled = len(self._all_columns) - near.sum(axis=1)

@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from components.aircraft.known_targets import KnownTraffic
 from components.geometry import ellipsoid
 from components.geometry.earth_models import LineOfSight
 from components.geometry.ellipsoid import enu_to_geodetic
-from components.line_of_sight.rungs import true_reach_m
+from components.geometry.error_bounds import true_reach_m
+from components.line_of_sight.rungs import seeming_look
 from components.messages.reach import FarthestLook
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -71,14 +73,10 @@ def test_no_model_loses_who_it_takes_to_be_in_reach(
 def test_who_seems_to_be_in_reach_is_within_the_true_reach(model: str) -> None:
     rng = np.random.default_rng(6)
     pairs = 400 if model == "geodesic" else 20_000
-    roster = Roster.of([])
     for reach_m in (2e3, 15e3, 60e3):
         for lat in (-70.0, 0.0, 40.0, 80.0):
             own = (rng.uniform(lat - 0.5, lat + 0.5, pairs), 170.0, rng.uniform(0, 9e3, pairs))
-            envelope = SimpleNamespace(own_lat_deg=(lat - 0.5, lat + 0.5), own_alt_m=(0.0, 9e3))
-            offer = KnownTraffic(roster, lambda _reach, _lasts, found=envelope: found)
-            context = SimpleNamespace(producers=[SimpleNamespace(offer=offer)])
-            true_m = true_reach_m(context, model, FarthestLook(reach_m))  # type: ignore[arg-type]
+            true_m = true_reach_m(model, reach_m, (lat - 0.5, lat + 0.5), (0.0, 9e3))
             assert reach_m < true_m < 1.2 * reach_m
             distance, bearing = rng.uniform(0.8, 1.3, pairs) * reach_m, rng.uniform(0, 6.28, pairs)
             up = rng.uniform(-0.3, 0.3, pairs) * distance
@@ -94,11 +92,12 @@ def test_who_seems_to_be_in_reach_is_within_the_true_reach(model: str) -> None:
 
 
 def test_nothing_is_proven_at_a_pole_and_the_exact_form_needs_no_proof() -> None:
-    look = FarthestLook(15e3)
-    envelope = SimpleNamespace(own_lat_deg=(89.95, 89.99), own_alt_m=(0.0, 100.0))
+    look, envelope = FarthestLook(15e3), SimpleNamespace()
+    assert true_reach_m("flat_earth", 15e3, (89.95, 89.99), (0.0, 100.0)) == math.inf
     offer = KnownTraffic(Roster.of([]), lambda _reach, _lasts: envelope)
-    context = SimpleNamespace(producers=[SimpleNamespace(offer=offer)])
-    assert true_reach_m(context, "flat_earth", look) == math.inf  # type: ignore[arg-type]
-    assert true_reach_m(context, "ellipsoid", look) == 15e3  # type: ignore[arg-type]
-    unknown = SimpleNamespace(producers=[SimpleNamespace(offer=None)])
-    assert true_reach_m(unknown, "flat_earth", look) == math.inf  # type: ignore[arg-type]
+    context: Any = SimpleNamespace(producers=[SimpleNamespace(offer=offer)])
+    assert seeming_look(context, "flat_earth", look).seeming == (("flat_earth", 15e3),)
+    assert seeming_look(context, "ellipsoid", look) == look
+    assert not offer.asked
+    unknown: Any = SimpleNamespace(producers=[SimpleNamespace(offer=None)])
+    assert seeming_look(unknown, "flat_earth", look) == FarthestLook(math.inf)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from components.formats.asterix_file import record_asterix
+from components.formats.asterix_records import read_records
 from components.formats.csv_file import record_rows, record_table
 from components.formats.daa_file import record_daa
 from components.formats.receiver_logs import log_of
@@ -167,12 +168,27 @@ _CAPTURES = (".pcap", ".pcapng", ".cap")
 
 
 def _blocks_of(problems: Problems, data: bytes) -> tuple[float, bytes, int]:
-    """Return when the first datagram with ASTERIX was captured, all of it, and how many others."""
+    """Return when the first datagram with ASTERIX was captured, all of it, and how many others.
+
+    Where not all can be read, each is tried by itself: other protocols may look like data blocks,
+    and a radar may speak an edition that is not known.
+    """
     sent = udp_payloads(problems, data)
     blocks = [(time_s, payload) for time_s, payload in sent if _is_asterix(payload)]
+    path = Path(problems.path)
+    if blocks and not _can_be_read(path, b"".join(payload for _, payload in blocks)):
+        blocks = [one for one in blocks if _can_be_read(path, one[1])]
     if not blocks:
-        problems.fail(f"none of {len(sent)} datagrams of the capture is ASTERIX")
+        problems.fail(f"none of {len(sent)} datagrams of the capture is ASTERIX that can be read")
     return blocks[0][0], b"".join(payload for _, payload in blocks), len(sent) - len(blocks)
+
+
+def _can_be_read(path: Path, data: bytes) -> bool:
+    try:
+        read_records(path, data)
+    except TrafficFileError:
+        return False
+    return True
 
 
 def _of_capture(problems: Problems, data: bytes, altitude: Altitude | None) -> Recording:
@@ -180,7 +196,9 @@ def _of_capture(problems: Problems, data: bytes, altitude: Altitude | None) -> R
     first_s, blocks, other = _blocks_of(problems, data)
     recording = record_asterix(problems, blocks, altitude, of_day_s=first_s)
     if other:
-        recording.notes.warnings.append(f"{other} datagrams are no ASTERIX and were left out")
+        recording.notes.warnings.append(
+            f"{other} datagrams are no ASTERIX that can be read and were left out"
+        )
     return recording
 
 

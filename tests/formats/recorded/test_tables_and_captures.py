@@ -124,12 +124,13 @@ def test_asterix_is_read_out_of_captures_with_their_day(tmp_path, make):
     pytest.importorskip("asterix", reason="needs asterix")
     sent = [(START + 0.4 + k, block) for k, block in enumerate(adsb())]
     sent.insert(2, (START + 1.5, b"GET / HTTP/1.1"))
+    sent.insert(3, (START + 1.6, b"\x3e\x00\x05\xff\xff"))  # a block without its records
     found = read(tmp_path, "udp.dump", make(sent))
     (one,) = found.samples.values()
     assert one["time"] == pytest.approx(START + np.arange(5.0), abs=1 / 256)
     assert one["lat"] == pytest.approx(47.0 + 0.001 * np.arange(5), abs=1e-6)
     assert one["alt"] == pytest.approx([1524.0] * 5)
-    assert found.notes.warnings == ["1 datagrams are no ASTERIX and were left out"]
+    assert found.notes.warnings == ["2 datagrams are no ASTERIX that can be read and were left out"]
 
 
 def test_plots_of_a_radar_are_read_out_of_a_capture(tmp_path):
@@ -152,6 +153,10 @@ def test_plots_of_a_radar_are_read_out_of_a_capture(tmp_path):
         np.testing.assert_array_equal(other.entries[name], values)
     assert other.entries["range_m"] == pytest.approx([30_000, 30_100, 30_200], abs=4)
     assert captured_asterix(plain) is None
+    with pytest.raises(
+        TrafficFileError, match=r"its 3 plots of radars \(048\) are no aircraft yet"
+    ):
+        record(captured)
 
 
 KINDS = {
