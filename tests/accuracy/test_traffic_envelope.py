@@ -109,3 +109,16 @@ def test_a_tilted_sensor_sees_steeper_body_elevations() -> None:
     _, elevation = tilted.to_body(np.linspace(-1, 1, 201), np.full(201, 0.3))
     steepest_rad = tilted.reach(level).steepest_rad
     assert np.abs(elevation).max() <= steepest_rad + 1e-15 and steepest_rad == pytest.approx(0.7)
+
+
+def test_the_lowest_and_the_highest_target_in_reach_bound_the_altitudes() -> None:
+    """And one out of reach does not; with no speed they are known to a margin of a metre."""
+    heights_m = {"low": (0.001, 300.0), "middle": (0.002, 500.0), "high": (-0.001, 900.0)}
+    heights_m |= {"far and low": (1.0, 20.0), "far and high": (-1.0, 9000.0)}
+    own = ScriptedTrajectory("own", lat_deg=0, lon_deg=0, alt_m=500, speed_mps=0.001)
+    targets = [
+        ScriptedTrajectory(name, lat_deg=lat, lon_deg=0, alt_m=alt, speed_mps=0.001)
+        for name, (lat, alt) in heights_m.items()
+    ]
+    low, high = traffic_envelope(own, ScriptedFleet(targets), 10.0, 5000.0).target_alt_m
+    assert 298.9 < low <= 300.0 and 900.0 <= high < 901.1

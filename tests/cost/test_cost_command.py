@@ -1,9 +1,11 @@
 """`dsa-des cost` from the outside, and its errors against independent calculations."""
 
+import gc
 import json
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import mpmath
 import numpy as np
@@ -20,7 +22,7 @@ from dsa_des.commands import cost
 from dsa_des.commands.cost import ladders_to_climb
 from dsa_des.costs import replay
 from dsa_des.costs.climb import climb
-from dsa_des.costs.replay import run_rung
+from dsa_des.costs.replay import RungRun, run_rung
 from dsa_des.costs.variants import Choice, Variants
 
 SCENE = Path(__file__).parents[2] / "configs" / "first_light.toml"
@@ -260,3 +262,29 @@ def test_the_chain_is_combined_of_what_is_on_the_fronts(tmp_path):
     assert any(r["pareto"] for r in chain)
     assert not math.isnan(chain[0]["cpu_us_per_target_scan"])
     assert (out / "chain.png").exists() and (out / "chain.parquet").exists()
+
+
+@pytest.mark.parametrize("collects", [True, False])
+@pytest.mark.parametrize("fails", [False, True])
+def test_garbage_is_collected_after_a_timed_pass_as_before_it(collects, fails, monkeypatch):
+    seen = []
+
+    def run(wake):
+        seen.append((wake, gc.isenabled()))
+        if fails:
+            raise RuntimeError("the block fails")
+
+    timed = RungRun(None, "radar", ["first", "second"], {}, 0.0, 0.0)
+    monkeypatch.setattr(timed, "fresh", lambda: SimpleNamespace(run=run))
+    before = gc.isenabled()
+    try:
+        (gc.enable if collects else gc.disable)()
+        if fails:
+            with pytest.raises(RuntimeError, match="the block fails"):
+                timed.pass_s()
+        else:
+            assert timed.pass_s() >= 0.0
+        assert gc.isenabled() == collects
+    finally:
+        (gc.enable if before else gc.disable)()
+    assert seen == [("first", False), ("second", False)][: 1 if fails else 2]

@@ -99,6 +99,17 @@ def test_distances_of_f3442_are_exclusive() -> None:
     assert np.isnan(never)
 
 
+def test_a_loss_of_the_smaller_volume_is_looked_for_after_that_of_the_larger() -> None:
+    """In whichever piece of the flight it comes; and the first time counts, not a later one."""
+    pieces = [
+        Separation("x", 2.0 * k + np.arange(2.0), far_m, far_m, np.zeros(2))
+        for k, far_m in enumerate(np.array([[900.0, 600.0], [500.0, 400.0], [150.0, 140.0]]))
+    ]
+    flight = SimpleNamespace(pieces=lambda: iter(pieces), between_samples=False)
+    assert first_inside(flight, WELL_CLEAR_M, NMAC_M) == [1.0, 4.0]
+    assert first_inside(flight, NMAC_M, WELL_CLEAR_M) == [4.0, 1.0]
+
+
 def test_distances_do_not_depend_on_the_pieces_they_come_in(
     small: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

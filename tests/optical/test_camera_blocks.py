@@ -3,7 +3,9 @@
 import math
 
 import pytest
+from wired import chain, sensor
 
+import dsa_des
 from components.optical.sensors import (
     ElectroOptical,
     ElectroOpticalParameters,
@@ -110,3 +112,28 @@ def test_targets_that_lack_a_silhouette_are_a_problem_before_the_run(scene, band
         Simulation(load_scene(path))
     (problem,) = caught.value.problems
     assert problem.key == f"blocks.{band}" and said in problem.message
+
+
+@pytest.mark.parametrize("contrast", ["contrast", "contrast_ir"])
+def test_what_has_no_contrast_makes_no_camera_look_farther(contrast):
+    """The range of the faintest signature follows from the pixels that the visible one needs."""
+    kind = {"contrast": "optical.eo", "contrast_ir": "optical.ir"}[contrast]
+    grid = {**CAMERA, "azimuth_pixels": 8000, "azimuth_deg": [-40, 40]}
+    grid |= {"elevation_pixels": 2000, "elevation_deg": [-10, 10]}
+    camera = sensor(kind, threshold=50.0, static_weight=1.0, **grid)
+    shown = {"front_m2": 1.0, "side_m2": 4.0, "horizontal_m2": 3.0}
+    huge = {"front_m2": 100.0, "side_m2": 400.0, "horizontal_m2": 500.0}
+    shown, huge = ({"eo": of, "ir": {**of, "back_m2": 0.5}} for of in (shown, huge))
+    there = {"north_m": 900.0, "east_m": 0.0, "up_m": 0.0}
+    small = {"name": "small", **there, contrast: 0.5, **shown}
+    hidden = {"name": "hidden", **there, contrast: 0.0, **huge}
+
+    def farthest_m(*targets):
+        scene = dsa_des.load_scene(chain({"camera": camera}, targets=targets))
+        return Simulation(scene).components["camera"].reach.range_max_m
+
+    # 50 / 0.5 pixels of 0.01 degrees each way; 1 m is the margin.
+    expected_m = 1.0 + math.sqrt(8.0 / (50.0 / 0.5)) / math.radians(0.01)
+    for targets in ((small,), (small, hidden), (hidden, small)):
+        assert farthest_m(*targets) == pytest.approx(expected_m, rel=1e-6)
+    assert farthest_m(hidden) == pytest.approx(1.0)

@@ -11,7 +11,7 @@ from covering import covers
 from same_runs import same_as_alone, same_in_any_window
 
 import components.optical.image as image
-from components.optical.flow import find_spot
+from components.optical.flow import find_spot, spot_flow
 from components.optical.picture import Pinhole, coverages, target_outlines, union_coverage
 from components.optical.silhouette import union_area
 from dsa_des.errors import SceneError
@@ -246,3 +246,22 @@ def test_without_opencv_one_line_says_how_it_is_had(configs):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 2 and "pip install 'dsa-des[image]'" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_what_lies_on_its_side_flows_sideways_and_as_surely():
+    """A picture has no axis of its own: with rows for columns x is y, and the error stays."""
+    rows, columns = np.mgrid[:32, :32] + 0.5
+    noise = 0.02 * np.random.default_rng(3).standard_normal((2, 32, 32))
+
+    def seen(x, y):
+        return np.exp(-0.5 * (((columns - x) / 2.6) ** 2 + ((rows - y) / 1.3) ** 2))
+
+    earlier, later = noise + np.stack([seen(14.2, 15.4), seen(16.6, 16.1)])
+    everywhere = np.ones((32, 32), dtype=bool)
+    spot = find_spot(later, everywhere, 0.8, 0.02)
+    found = spot_flow(earlier, later, spot, everywhere, 0.02)
+    assert (found.x, found.y) == pytest.approx((2.4, 0.7), abs=0.1)
+    turned = find_spot(later.T, everywhere, 0.8, 0.02)
+    other = spot_flow(earlier.T, later.T, turned, everywhere, 0.02)
+    assert (other.y, other.x) == pytest.approx((found.x, found.y), abs=1e-6)
+    assert other.deviation == pytest.approx(found.deviation, rel=1e-6)

@@ -28,11 +28,17 @@ def test_motion_is_from_scan_to_scan_whatever_the_window(window):
     assert turned[:2] == [0.0, 0.0] and min(turned[2:]) > 0.1
 
 
+@pytest.mark.parametrize("published_hz", [4, 1])
 @pytest.mark.parametrize("window", [None, 1, 3])
-def test_the_first_declaration_stays_the_first(window):
-    """The third of consecutive detections, at 0.5 s, and none of those after it."""
+def test_the_first_declaration_stays_the_first(window, published_hz):
+    """The third of consecutive detections, at 0.5 s, and none of those after it.
+
+    Whether the traffic is new at each look, or still that of 0 s.
+    """
     radar = {**HEARS_ALL, "scan_rate_hz": 4, "declare_m": 3, "declare_n": 3}
-    simulation, rows = ran(chain({"radar": radar}, duration_s=3), window)
+    scene = chain({"radar": radar}, duration_s=3)
+    scene["blocks"]["traffic"]["update_rate_hz"] = published_hz
+    simulation, rows = ran(scene, window)
     found = simulation.components["radar"].report()["declarations"]["radar"]
     for target in crooked.TARGETS:
         (row,) = (r for r in rows if r["target"] == target["name"] and r["time_s"] == 0.5)

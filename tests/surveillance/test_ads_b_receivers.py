@@ -9,6 +9,8 @@ import pytest
 from same_runs import tables_of
 
 import dsa_des
+from components.surveillance.ads_b import ERRORS
+from dsa_des.costs.replay import run_rung, values_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, scene_of
@@ -191,3 +193,21 @@ def test_two_aircraft_with_one_address_are_refused(scene, other):
         Simulation(scene(kea=ADDRESS, moa=other))
     assert "6' is that of 'kea' and of 'moa': each aircraft has one" in str(caught.value)
     assert Simulation(scene(kea=ADDRESS, moa='mode_c = true\nicao_address = "4840D6"'))
+
+
+def test_costs_count_how_far_reports_lie_off_all_of_which_come(scene):
+    """However few are received: as far as is spoofed, less the way since the last squitter."""
+    kea = "ads_b = { spoofed_north_m = 3000, spoofed_east_m = -400 }"
+    ether = 'position_errors = "none"\ncompact = false'
+    here = run_rung(scene(kea=kea, ether=ether, moa="ads_b = {}", duration_s=6), "ether")
+    _, off = values_of(ERRORS, here, here)
+    north_m, east_m = off["north"].T, off["east"].T
+    flown = (((3000.0, -400.0), 70.0, 20.0), ((0.0, 0.0), 90.0, 100.0))
+    for index, (spoofed_m, speed_mps, heading_deg) in enumerate(flown):
+        known = np.isfinite(north_m[index])
+        assert known.sum() >= 5  # all looks but that at 0 s
+        heading = np.radians(heading_deg)
+        age_s = (spoofed_m[0] - north_m[index, known]) / (speed_mps * np.cos(heading))
+        assert ((age_s > -0.01) & (age_s < 0.61)).all() and np.ptp(age_s) > 0.05
+        other_s = (spoofed_m[1] - east_m[index, known]) / (speed_mps * np.sin(heading))
+        assert other_s == pytest.approx(age_s, abs=0.03)
