@@ -87,6 +87,26 @@ def test_altitudes_on_both_sides_of_every_edge_are_as_they_are_flown(climb):
     assert edges >= 2 and HORIZON_S < LOOKAHEAD_S
 
 
+@pytest.mark.parametrize("at_once", ["vertical_rate", "vertical_accel"])
+@pytest.mark.parametrize("intruder", [BELOW, ABOVE])
+def test_altitudes_that_are_taken_at_once_meet_who_is_level_with_them_while_near(intruder, at_once):
+    """Level all the time, so the volume is met at the heights flown through while it is near."""
+    values = {**VALUES, "lookahead_time": LOOKAHEAD_S, at_once: 0.0}
+    made = kind_of("alt", one_row(OWN), values)
+    volume = Volume(*SIZES, "none")
+    conflicts = made.against(one_row(intruder).columns(), Detector(volume))
+    found = conflicts.unsafe(0.0, LOOKAHEAD_S)[0]
+    time_s = np.linspace(0.0, LOOKAHEAD_S, 200_001)
+    east, north, up = (float(intruder[i]) + float(intruder[3 + i]) * time_s for i in range(3))
+    east -= float(OWN.east_m) + float(OWN.east_mps) * time_s
+    north -= float(OWN.north_m) + float(OWN.north_mps) * time_s
+    near = np.hypot(east, north) < SIZES[0]
+    assert near.any()
+    low, high = up[near].min() - SIZES[1], up[near].max() + SIZES[1]
+    assert found.tolist() == [bool(low < at < high) for at in made.values[0]]
+    assert 0 < found.sum() < len(found)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_band_is_narrower_than_a_step(kind, tmp_path):
     """But where a limit cuts it, or the way out of a violation is painted over it."""
