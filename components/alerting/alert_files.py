@@ -13,7 +13,7 @@ from components.alerting.alert_figure import draw_alerts
 from components.alerting.alert_tables import alert_table, bands_table, without_memory
 from components.alerting.encounter import Encounter, read_encounter
 from components.alerting.levels import Alerts, alert_levels
-from components.formats.recorded.traffic_of_files import Choice
+from components.formats.recorded.traffic_of_files import TrafficChoice
 from components.formats.text_rows import SPEED_MPS, TrafficFileError
 from dsa_des.block.shipped_files import found_or_shipped
 from dsa_des.errors import OutputError, UsageError
@@ -66,7 +66,7 @@ def alert_files(
     if no_hysteresis:
         configuration = without_memory(configuration)
     own = None if own_file is None else Path(own_file)
-    choice = Choice(ownship=ownship, own_file=own)
+    choice = TrafficChoice(ownship=ownship, own_file=own)
     done = _alerts(configuration, paths, _wind_mps(wind), choice)
     try:
         if several:
@@ -117,7 +117,7 @@ def _alerts(
     configuration: Configuration,
     paths: list[Path],
     wind_mps: tuple[float, float] | None,
-    choice: Choice,
+    choice: TrafficChoice,
 ) -> list[_Done]:
     """Return the alerts of all files, or one error about all that cannot be used."""
     done, problems = [], []

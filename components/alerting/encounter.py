@@ -12,7 +12,7 @@ from components.alerting.levels import AlertPairs
 from components.flights.attitude import fit_path
 from components.flights.sampled_flight import SampledTrajectory
 from components.formats.daa_file import DAIDALUS, EXTRA_COLUMNS, read_daa_samples
-from components.formats.recorded.traffic_of_files import Choice, read_traffic
+from components.formats.recorded.traffic_of_files import TrafficChoice, read_traffic
 from components.formats.text_rows import Problems
 from components.geometry import east_north_m, east_north_mps
 from components.guidance.situation import State
@@ -62,7 +62,7 @@ def read_encounter(
     path: str | PathLike[str],
     configuration: Configuration,
     wind_mps: tuple[float, float] | None = None,
-    choice: Choice = Choice(),  # noqa: B008
+    choice: TrafficChoice = TrafficChoice(),  # noqa: B008
 ) -> Encounter:
     """Read a file of recorded aircraft, of any kind, as is chosen; the first is the ownship.
 
@@ -110,11 +110,11 @@ def read_encounter(
 
 
 def _samples(
-    path: str | PathLike[str], choice: Choice
+    path: str | PathLike[str], choice: TrafficChoice
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
     """Return the samples of each aircraft of a file, and what was assumed of them."""
     file = read_traffic([Path(path)], choice)
-    if file.kind == DAIDALUS and choice == Choice():
+    if file.kind == DAIDALUS and choice == TrafficChoice():
         return read_daa_samples(path, tuple(EXTRA_COLUMNS)), ()
     own = file.ownship
     time_s = own.sample_times_s

@@ -21,7 +21,7 @@ from components.formats.asterix_records import (
 from components.formats.recording import Recording
 from components.formats.sample_columns import Altitude, SampleColumn, enu_velocity
 from components.formats.sample_table import SampleTable
-from components.formats.text_rows import Problems, TrafficFile, TrafficFileError
+from components.formats.text_rows import Problems, TrafficFileError
 from components.geometry import radii_of_curvature, wrap_pi
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.files.input_files import InputFileError, read_input_bytes
@@ -72,25 +72,6 @@ class RadarPlots:
     notes: list[str]
 
 
-def read_asterix(
-    path: str | PathLike[str], ownship: str | None = None, altitude: Altitude | None = None
-) -> TrafficFile:
-    """Read the aircraft of an ASTERIX file: system tracks (062) and ADS-B reports (021).
-
-    The ownship is said by its identification, or as ``"SAC/SIC/number"`` where it has none; left
-    out, it is the aircraft called ``OWNSHIP``, or else the first one. Times count from the earliest
-    record and go on over midnight. Heights are flight levels, of an aircraft that reports none its
-    geometric height; with `altitude`, those of that kind alone. All that is wrong is one
-    `TrafficFileError`, by records.
-    """
-    problems = Problems(str(path))
-    try:
-        data = read_input_bytes(Path(path))
-    except InputFileError as error:
-        problems.fail(str(error))
-    return record_asterix(problems, data, altitude, ownship, least=2).flights()
-
-
 def record_asterix(
     problems: Problems,
     data: bytes,
@@ -99,8 +80,11 @@ def record_asterix(
     of_day_s: float | None = None,
     least: int = 1,
 ) -> Recording:
-    """Return the aircraft of data blocks, see `read_asterix`.
+    """Return the aircraft of data blocks: system tracks (062) and ADS-B reports (021).
 
+    The ownship is said by its identification, or as ``"SAC/SIC/number"`` where it has none; left
+    out, it is the aircraft called ``OWNSHIP``, or else the first one. Heights are flight levels, of
+    an aircraft that reports none its geometric height; with `altitude`, those of that kind alone.
     Times count from the day's midnight, or in UTC where an instant near the first record is known.
     """
     records, warnings = _records(Path(problems.path), data)

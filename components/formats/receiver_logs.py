@@ -15,7 +15,7 @@ from itertools import chain
 from typing import Any
 
 from components.arguments.units import FOOT_M, KNOT_M_S
-from components.formats.reports import Log, Report
+from components.formats.reports import Log, PositionReport
 from components.formats.text_rows import Problems, each_line, text_of
 
 _FPM = FOOT_M / 60.0
@@ -23,7 +23,7 @@ _FPM = FOOT_M / 60.0
 _LASTS_S = 3.0
 
 
-Reports = Iterator[tuple[int, Report]]
+Reports = Iterator[tuple[int, PositionReport]]
 
 
 def log_of(problems: Problems, data: bytes) -> Log | None:
@@ -73,7 +73,7 @@ def json_documents(problems: Problems, data: bytes) -> Iterator[tuple[int, Any]]
         yield number, document
 
 
-_Reader = Callable[[Mapping[str, Any], dict[str, str]], Iterator[Report]]
+_Reader = Callable[[Mapping[str, Any], dict[str, str]], Iterator[PositionReport]]
 
 
 def _each(
@@ -84,7 +84,7 @@ def _each(
     callsigns: dict[str, str],
 ) -> Reports:
     """Give the reports of documents; a position that is still the last one is given once."""
-    last: dict[str, Report] = {}
+    last: dict[str, PositionReport] = {}
     for number, one in documents:
         if not isinstance(one, dict) or not marks <= one.keys():
             problems.fail(UNKNOWN_JSON, line=number)
@@ -109,7 +109,7 @@ def _is_number(value: Any) -> bool:
 _ROUNDED_S = 0.25
 
 
-def _is_again(sample: Report, before: Report) -> bool:
+def _is_again(sample: PositionReport, before: PositionReport) -> bool:
     """Tell whether two reports are of one position."""
     return (sample.lat, sample.lon) == (before.lat, before.lon) and (
         sample.time == before.time or abs(sample.time - before.time) <= _ROUNDED_S
@@ -124,14 +124,14 @@ def _less(time_s: Any, age_s: Any) -> Any:
     return time_s - age_s if isinstance(age_s, int | float) else time_s
 
 
-def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Report]:
+def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
     """Give the aircraft of an ``aircraft.json``, when their positions were received."""
     for craft in one["aircraft"]:
         name = str(craft["hex"])
         if craft.get("flight"):
             callsigns[name] = str(craft["flight"]).strip()
         climb = craft.get("geom_rate", craft.get("baro_rate", craft.get("vert_rate")))
-        yield Report(
+        yield PositionReport(
             name, _less(one["now"], craft.get("seen_pos", craft.get("seen"))),
             craft.get("lat"), craft.get("lon"), _times(craft.get("alt_geom"), FOOT_M),
             _times(craft.get("alt_baro", craft.get("altitude")), FOOT_M), craft.get("track"),
@@ -139,7 +139,7 @@ def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[
         )  # fmt: skip
 
 
-def _of_interface(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Report]:
+def _of_interface(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
     """Give the aircraft that ADS-B Exchange and others answer with: as readsb's, the time in ms."""
     yield from _of_aircraft({"now": one["now"] / 1000.0, "aircraft": one["ac"]}, callsigns)
 
@@ -148,7 +148,7 @@ def _of_interface(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator
 _GEOMETRIC = 8
 
 
-def _of_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Report]:
+def _of_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
     """Give the points of a trace: seconds after its timestamp, position, altitude, and more."""
     name = str(one["icao"])
     for point in one["trace"]:
@@ -158,20 +158,20 @@ def _of_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Rep
             alt, geometric = None, alt
         if isinstance(more, dict) and more.get("flight"):
             callsigns[name] = str(more["flight"]).strip()
-        yield Report(
+        yield PositionReport(
             name, one["timestamp"] + after_s, lat, lon, _times(geometric, FOOT_M),
             _times(alt, FOOT_M), trk, _times(gs, KNOT_M_S), _times(climb, _FPM),
         )  # fmt: skip
 
 
-def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Report]:
+def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
     """Give OpenSky's state vectors, at the instants of their positions."""
     for state in one["states"] or ():
         name, callsign, _, time_s, _, lon, lat, barometric, _, gs, trk, climb = state[:12]
         if callsign:
             callsigns[name] = str(callsign).strip()
         geometric = state[13] if len(state) > 13 else None
-        yield Report(str(name), time_s, lat, lon, geometric, barometric, trk, gs, climb)
+        yield PositionReport(str(name), time_s, lat, lon, geometric, barometric, trk, gs, climb)
 
 
 #: By the keys that a document has: what it is called, and what reads it.
@@ -212,7 +212,7 @@ def _of_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Repor
             continue
         at, move = moves.get(name, (-math.inf, ()))
         recent = move if abs(time_s - at) <= _LASTS_S else (None,) * 3
-        yield number, Report(name, time_s, lat, lon, None, _times(alt, FOOT_M), *recent)
+        yield number, PositionReport(name, time_s, lat, lon, None, _times(alt, FOOT_M), *recent)
 
 
 def _midnight(date: str) -> float | None:

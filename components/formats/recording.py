@@ -24,7 +24,7 @@ _SILENT_S, _SILENT_STEPS = 30.0, 10.0
 Samples = dict[str, FloatArray]
 
 
-class Notes:
+class ReadingNotes:
     """What was assumed, reordered or left out: what is harmless, and what changes the flights."""
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class Notes:
             (self.harmless if harmless else self.warnings).append(cases[0] + more)
         self._of_aircraft.clear()
 
-    def add(self, other: Notes, file: str) -> None:
+    def add(self, other: ReadingNotes, file: str) -> None:
         """Add those of another file, by its name."""
         other.settle()
         self.settle()
@@ -63,7 +63,7 @@ class Recording:
         Of its file.
     samples : dict
         Columns by aircraft, the ownship's first; times are the file's own.
-    notes : Notes
+    notes : ReadingNotes
     kind, units, height : str
         What the file is, in which units it says things, and which height is read.
     callsigns : mapping
@@ -72,7 +72,7 @@ class Recording:
 
     problems: Problems
     samples: dict[str, Samples]
-    notes: Notes
+    notes: ReadingNotes
     kind: str = ""
     units: str = ""
     height: str = ""
@@ -204,7 +204,7 @@ def aircraft_of(time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray) ->
 WithLines = dict[str, tuple[IntArray, Samples]]
 
 
-def told_apart(samples: WithLines, notes: Notes) -> WithLines:
+def told_apart(samples: WithLines, notes: ReadingNotes) -> WithLines:
     """Return samples with names of their own for aircraft that share one, and note each such name.
 
     The first keeps its name, others are numbered from 2: ``"X (2)"``.

@@ -10,7 +10,7 @@ from components.formats.sample_table import SampleTable
 from components.formats.text_rows import Problems
 
 
-class Report(NamedTuple):
+class PositionReport(NamedTuple):
     """One report: a number each, or what stands in its place; in SI units, degrees."""
 
     name: str
@@ -36,7 +36,7 @@ class Log(NamedTuple):
 
     kind: str
     units: str
-    reports: Iterator[tuple[int, Report]]
+    reports: Iterator[tuple[int, PositionReport]]
     callsigns: Mapping[str, str]
     rows: str = "reports"
     #: What its reader has to say of it, when the reports are read.
@@ -46,7 +46,7 @@ class Log(NamedTuple):
 _MOVES = {"trk": "track", "gs": "speed", "vs": "climb rate"}
 _ANGLES = ("yaw", "pitch", "roll")
 #: Where values stand in a report.
-_PLACE = {name: place for place, name in enumerate(Report._fields)}
+_PLACE = {name: place for place, name in enumerate(PositionReport._fields)}
 
 
 def recording_of(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from components.arguments.units import FOOT_M
-from components.formats.recording import Notes, Recording, told_apart
+from components.formats.recording import ReadingNotes, Recording, told_apart
 from components.formats.sample_columns import SampleColumn, is_missing
 from components.formats.text_rows import MOST_OF_A_CELL, MOST_PROBLEMS, Problems, TrafficFile
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -82,7 +82,7 @@ class SampleTable:
         self._problems, self._name_column, self._columns = problems, name_column, columns
         self._parse_time, self._gaps = parse_time, gaps
         self._aircraft: dict[str, _Rows] = {}
-        self.notes = Notes()
+        self.notes = ReadingNotes()
         self._apart: dict[str, list[tuple[float, str]]] = {}
         self._second: dict[str, list[str]] = {}
         self._width = len(headers)

@@ -15,7 +15,7 @@ from components.thesis.drawing import GREY, legend_below, panels
 from components.thesis.radar import CLASSES, pd_at
 from components.thesis.rows import Basis, Cells, Made, Row, calibrated, configured, predicted
 from components.thesis.scenes import (
-    Recording,
+    ThesisRecording,
     aircraft,
     monte_carlo,
     radar_parameters,
@@ -232,7 +232,9 @@ def detection_ranges(printed: Cells) -> Made:
     return Made(rows, made.pictures, {"table_4_2_simulated": data})
 
 
-def _declared(printed: Cells, runs: list[Recording], flown: Mapping[str, FloatArray]) -> list[Row]:
+def _declared(
+    printed: Cells, runs: list[ThesisRecording], flown: Mapping[str, FloatArray]
+) -> list[Row]:
     """Return the averages by the rule of declaration that gives the small class's."""
     least = SCANS_IN_A_ROW
     averages = {name: float(np.mean(declared_ranges(runs, name, least))) for name in CLASSES}
@@ -256,7 +258,7 @@ def _declared(printed: Cells, runs: list[Recording], flown: Mapping[str, FloatAr
     return rows
 
 
-def declared_ranges(runs: list[Recording], name: str, least: int) -> FloatArray:
+def declared_ranges(runs: list[ThesisRecording], name: str, least: int) -> FloatArray:
     """Return where each run has detected a target in so many scans in a row, km."""
     result = []
     for replica in runs:
@@ -276,7 +278,7 @@ def measured_ranges() -> Mapping[str, FloatArray]:
     }
 
 
-def simulated_ranges(runs: list[Recording]) -> dict[str, tuple[FloatArray, FloatArray]]:
+def simulated_ranges(runs: list[ThesisRecording]) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Return, by class and for each run, the first range detected and that after the last miss."""
     result: dict[str, tuple[FloatArray, FloatArray]] = {}
     for name in CLASSES:

@@ -89,7 +89,7 @@ def _without_type(name: str) -> dict[str, Any]:
 
 
 @dataclass
-class Recording:
+class ThesisRecording:
     """What a run of a scene recorded."""
 
     #: Table name → column name → values.
@@ -105,7 +105,7 @@ class Recording:
 
 
 @dataclass
-class SceneRun(Recording):
+class SceneRun(ThesisRecording):
     """A run of one scene, with what ran."""
 
     simulation: Simulation
@@ -147,11 +147,11 @@ def run(loaded: Scene) -> SceneRun:
     return SceneRun(sink.tables(), simulation, wall_s)
 
 
-def monte_carlo(loaded: Scene, replicas: int) -> list[Recording]:
+def monte_carlo(loaded: Scene, replicas: int) -> list[ThesisRecording]:
     """Run a scene with the seeds 0, 1, ...; the draws of each run are its own."""
     done = []
     for outcome in run_replicas(loaded, [Replica(seed) for seed in range(replicas)]):
         if isinstance(outcome, Failed):
             raise ValueError(f"{loaded.path}: {outcome.error}")
-        done.append(Recording(outcome.tables))
+        done.append(ThesisRecording(outcome.tables))
     return done

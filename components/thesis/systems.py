@@ -16,8 +16,8 @@ from components.thesis.drawing import EO, GREY, RADAR, legend_below, panels
 from components.thesis.radar import NAUTICAL_MILE_KM, range_of_pd_km
 from components.thesis.rows import Basis, Cells, Columns, Made, Picture, Row, configured, predicted
 from components.thesis.scenes import (
-    Recording,
     SceneRun,
+    ThesisRecording,
     flights_of,
     monte_carlo,
     radar_parameters,
@@ -125,7 +125,7 @@ def _tecvol(printed: Cells) -> tuple[list[Row], Picture, Columns]:
     return rows, Picture("table_2_4_tecvol", caption, draw), data
 
 
-def _errors(runs: list[Recording], flights: Flights, name: str) -> Errors:
+def _errors(runs: list[ThesisRecording], flights: Flights, name: str) -> Errors:
     """Return the errors of what a sensor reports, the ownship flying level to the north."""
     parts = [_with_own_position(run, name) for run in runs]
     seen = {key: np.concatenate([part[key] for part in parts])
@@ -140,7 +140,7 @@ def _errors(runs: list[Recording], flights: Flights, name: str) -> Errors:
     )
 
 
-def _with_own_position(run: Recording, name: str) -> dict[str, Any]:
+def _with_own_position(run: ThesisRecording, name: str) -> dict[str, Any]:
     """Return what a sensor detected, and where the ownship believed to be then."""
     result, scans = run.rows("detections", block=name), run.rows("scans", block=name)
     row = np.searchsorted(scans["tick"], result["tick"])

@@ -11,10 +11,10 @@ from pydantic import Field, model_validator
 
 from components.flights.fleet import Trajectory
 from components.formats.daa_file import read_daa
-from components.formats.recorded.traffic_of_files import Choice, read_traffic
+from components.formats.recorded.traffic_of_files import TrafficChoice, read_traffic
 from components.formats.sample_columns import Altitude
 from components.formats.text_rows import TrafficFile
-from components.traffic.recorded import FileParameters, RecordedParameters, RecordedTraffic
+from components.traffic.recorded import FileParameters, RecordedTraffic, RecordedTrafficParameters
 from components.traffic.scripted import Ownship, flight_of
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.files.input_files import is_folder, read_once
@@ -55,7 +55,7 @@ class Moved(Parameters):
     up_m: float = Field(default=0.0, description="Up, m.")
 
 
-class FileTrafficParameters(RecordedParameters):
+class FileTrafficParameters(RecordedTrafficParameters):
     """Parameters of recorded traffic of any kind."""
 
     file: ScenePath | list[ScenePath] = Field(
@@ -133,11 +133,11 @@ class FileTrafficParameters(RecordedParameters):
             raise ValueError("file: must name at least one file")
         return tuple(found)
 
-    def choice(self) -> Choice:
+    def choice(self) -> TrafficChoice:
         """Return what is taken of the files."""
         lowest, highest = self.lowest_m, self.highest_m
         offset = self.own_moved
-        return Choice(
+        return TrafficChoice(
             ownship=self.ownship,
             altitude=self.altitude,
             own_file=self.own_file,

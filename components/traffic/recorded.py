@@ -140,7 +140,7 @@ def derived_attitude(content: TrafficFile) -> dict[str, Any]:
     return names
 
 
-class RecordedParameters(SourceParameters):
+class RecordedTrafficParameters(SourceParameters):
     """Parameters of recorded traffic."""
 
     intruder: Aircraft = Field(
@@ -154,7 +154,7 @@ class RecordedParameters(SourceParameters):
     )
 
 
-class FileParameters(RecordedParameters):
+class FileParameters(RecordedTrafficParameters):
     """Parameters of traffic in one file."""
 
     file: ScenePath = Field(description="The traffic file.")

@@ -42,7 +42,7 @@ _SURELY_NS = 2_000_000
 
 
 @dataclass(frozen=True)
-class Flown:
+class FlownRuns:
     """When runs first reached some levels, s, (levels, runs); NaN for never.
 
     The weights (runs,) say how often each happens; `errors` has a text for each that failed.
@@ -55,7 +55,7 @@ class Flown:
 
 #: Flies runs, each of a repetition of some number (the pilot is -1), and looks when they reach some
 #: levels, which fall.
-Fly = Callable[[Sequence[Replica], IntArray, Sequence[float]], Flown]
+Fly = Callable[[Sequence[Replica], IntArray, Sequence[float]], FlownRuns]
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from dsa_des.files.sealed_files import parquet
 from dsa_des.record.undone import Undone, added
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas, undone_in
-from dsa_des.replicas.splitting import Flown, find_levels, repeated
+from dsa_des.replicas.splitting import FlownRuns, find_levels, repeated
 from dsa_des.results.folder import undone_of
 from dsa_des.results.record import (
     CRASHED,
@@ -268,13 +268,13 @@ def _split(
     assert table is not None
     score, candidates = table.score, metric.metric.scores[table.score]
 
-    def fly(runs: Sequence[Replica], number: IntArray, levels: Sequence[float]) -> Flown:
+    def fly(runs: Sequence[Replica], number: IntArray, levels: Sequence[float]) -> FlownRuns:
         wrong: list[str | None] = [None] * len(runs)
         near, said = [metric.scored(score, levels)], [*undone, []]  # that of the pilot is lost
         known = _flown(scene, near, runs, wrong, key, np.append(of, len(undone))[number], said)
         nothing = np.full(len(runs), np.nan)
         times_s = [known.get(str(k), nothing) for k in range(len(levels))]
-        return Flown(np.array(times_s), known.get("weight", nothing), wrong)
+        return FlownRuns(np.array(times_s), known.get("weight", nothing), wrong)
 
     known = repr((study.tables, study.base.data, study.seed, study.sets, study.swaps, cell))
     try:

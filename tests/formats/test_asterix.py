@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pymap3d
 import pytest
+from asterix_flights import read_asterix
 from click.testing import CliRunner
 from covering import covers
 from scipy.spatial.transform import Rotation
@@ -17,7 +18,7 @@ import dsa_des
 from components.display.recorded_run import RecordedTables
 from components.export.asterix_export import asterix_bytes
 from components.export.command import export
-from components.formats.asterix_file import read_asterix, read_asterix_plots
+from components.formats.asterix_file import read_asterix_plots
 from components.formats.asterix_records import ADS_B, PLOTS, SYSTEM_TRACKS, read_records
 from components.formats.text_rows import TrafficFileError
 from components.messages.state_tracks import COVARIANCE

@@ -6,10 +6,11 @@ import struct
 import numpy as np
 import pymap3d
 import pytest
+from asterix_flights import read_asterix
 from covering import covers
 
 import dsa_des
-from components.formats.asterix_file import read_asterix, read_asterix_plots
+from components.formats.asterix_file import read_asterix_plots
 from components.formats.text_rows import TrafficFileError
 
 pytest.importorskip("asterix", reason="needs the extra asterix")

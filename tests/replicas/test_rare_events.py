@@ -12,7 +12,7 @@ import pytest
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.splitting import Flown, chosen_of, find_levels, repeated
+from dsa_des.replicas.splitting import FlownRuns, chosen_of, find_levels, repeated
 from dsa_des.results.statistics import rare
 from dsa_des.studies.chunk import run_chunk
 from dsa_des.studies.study_file import read_study
@@ -35,7 +35,7 @@ def chain(runs, of, levels, weights=None):
     # At second t it is known whether it turned before t; a branch draws anew a little later.
     at_s = [np.where(LAST - level <= turned, LAST - level - 0.5, np.nan) for level in levels]
     ones = np.ones(len(runs)) if weights is None else weights(runs)
-    return Flown(np.array(at_s), ones, [None] * len(runs))
+    return FlownRuns(np.array(at_s), ones, [None] * len(runs))
 
 
 def roots(repetition, count=50):
@@ -87,7 +87,7 @@ def test_weights_of_the_first_runs_count():
             runs, of, levels, lambda some: np.array([1.0 + 8.0 * (r.seed % 2 == 0) for r in some])
         )
         odd = np.array([run.seed % 2 == 1 for run in runs])
-        return Flown(np.where(odd, np.nan, said.reached_s), said.weights, said.errors)
+        return FlownRuns(np.where(odd, np.nan, said.reached_s), said.weights, said.errors)
 
     found = repeated([roots(n) for n in range(60)], [*range(60)], (17.0, 14.0, 11.0), flown)
     p = np.array([one.probability for one in found])
@@ -122,7 +122,7 @@ def test_the_interval_of_a_skewed_mean_is_that_of_its_logarithm():
 def test_a_score_that_never_rises_is_said():
     def stuck(runs, of, levels):
         at = np.where(np.array(levels)[:, np.newaxis] >= 12.0, 3.0, np.nan)
-        return Flown(at.repeat(len(runs), axis=1), np.ones(len(runs)), [None] * len(runs))
+        return FlownRuns(at.repeat(len(runs), axis=1), np.ones(len(runs)), [None] * len(runs))
 
     with pytest.raises(
         ValueError, match=r"the score never rises: of 50 runs of the pilot.* of 12 "
@@ -134,7 +134,7 @@ def test_a_run_that_fails_fails_its_repetition_alone():
     def failing(runs, of, levels):
         said = chain(runs, of, levels)
         errors = ["radar failed" if run.seed == 1003 else None for run in runs]
-        return Flown(said.reached_s, said.weights, errors)
+        return FlownRuns(said.reached_s, said.weights, errors)
 
     found = repeated([roots(n) for n in range(3)], [0, 1, 2], (14.0, 0.0), failing)
     assert [one.error for one in found] == [None, "radar failed", None]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from components.formats.recorded.ulog_file import Topic, read_topics
-from components.formats.reports import Log, Report
+from components.formats.reports import Log, PositionReport
 from components.formats.text_rows import Problems
 from dsa_des.arrays.types import AnyArray, FloatArray
 
@@ -39,7 +39,7 @@ def ulog_log(problems: Problems, data: bytes, stem: str) -> Log:
     topics = read_topics(problems, data, [*_POSITIONS, *_OTHERS], warnings)
     callsigns: dict[str, str] = {}
 
-    def each() -> Iterator[tuple[int, Report]]:
+    def each() -> Iterator[tuple[int, PositionReport]]:
         own, heard = _own_of_ulog(problems, topics, stem), _heard_by_px4(topics, callsigns)
         try:
             yield from enumerate(chain(own, heard), start=1)
@@ -61,7 +61,9 @@ def _utc_less_boot_s(topics: Mapping[str, Topic]) -> float:
     return 0.0
 
 
-def _own_of_ulog(problems: Problems, topics: Mapping[str, Topic], stem: str) -> Iterator[Report]:
+def _own_of_ulog(
+    problems: Problems, topics: Mapping[str, Topic], stem: str
+) -> Iterator[PositionReport]:
     name = next((name for name in _POSITIONS if len(topics.get(name, {}).get("timestamp", ()))), "")
     if not name:
         problems.fail(f"holds no position: one of the topics {', '.join(_POSITIONS)} is needed")
@@ -69,7 +71,7 @@ def _own_of_ulog(problems: Problems, topics: Mapping[str, Topic], stem: str) -> 
         yield from _own_samples(topics, name, stem)
 
 
-def _own_samples(topics: Mapping[str, Topic], name: str, stem: str) -> Iterator[Report]:
+def _own_samples(topics: Mapping[str, Topic], name: str, stem: str) -> Iterator[PositionReport]:
     own = {key: np.asarray(values, float) for key, values in topics[name].items()}
     boot_s = own["timestamp"] / 1e6
     if "latitude_deg" in own:
@@ -85,7 +87,9 @@ def _own_samples(topics: Mapping[str, Topic], name: str, stem: str) -> Iterator[
     for time_s, lat_deg, lon_deg, alt_m, trk, gs, vs, yaw, pitch, roll in columns[
         :, fix
     ].T.tolist():
-        yield Report(stem, time_s, lat_deg, lon_deg, alt_m, None, trk, gs, vs, yaw, pitch, roll)
+        yield PositionReport(
+            stem, time_s, lat_deg, lon_deg, alt_m, None, trk, gs, vs, yaw, pitch, roll
+        )
 
 
 def _at(times_s: FloatArray, values: AnyArray, wanted_s: FloatArray) -> FloatArray:
@@ -123,7 +127,9 @@ def _attitude(topics: Mapping[str, Topic], boot_s: FloatArray) -> list[FloatArra
     return [np.degrees(angle) for angle in (yaw, pitch, roll)]
 
 
-def _heard_by_px4(topics: Mapping[str, Topic], callsigns: dict[str, str]) -> Iterator[Report]:
+def _heard_by_px4(
+    topics: Mapping[str, Topic], callsigns: dict[str, str]
+) -> Iterator[PositionReport]:
     heard = topics.get("transponder_report", {})
     if not len(heard.get("timestamp", ())):
         return
@@ -147,14 +153,14 @@ def _heard_by_px4(topics: Mapping[str, Topic], callsigns: dict[str, str]) -> Ite
 def _of_transponder(
     callsigns: dict[str, str], address: int, callsign: str, time_s: float, lat: float, lon: float,
     kind: float, alt: float, heading: float, fast: float, climb: float, flags: int,
-) -> Report:  # fmt: skip
+) -> PositionReport:  # fmt: skip
     """Return a report that an autopilot's receiver made; units are degrees, m, m/s."""
     name = f"{address:06x}"
     if flags & _CALLSIGN and callsign.strip("\0 "):
         callsigns[name] = callsign.strip("\0 ")
     height = alt if flags & _ALTITUDE else None
     has_place, moves = flags & _COORDS, flags & _HEADING and flags & _VELOCITY
-    return Report(
+    return PositionReport(
         name, time_s, lat if has_place else None, lon if has_place else None,
         height if kind == _GEOMETRIC else None, None if kind == _GEOMETRIC else height,
         heading % 360.0 if moves else None, fast if moves else None, climb if moves else None,
@@ -220,7 +226,7 @@ def tlog_log(problems: Problems, data: bytes, stem: str) -> Log:
     warnings: list[str] = []
     frames = _frames(data, lost)
 
-    def each() -> Iterator[tuple[int, Report]]:
+    def each() -> Iterator[tuple[int, PositionReport]]:
         yield from _of_frames(problems, frames, stem, callsigns)
         if lost:
             warnings.append(f"{len(lost)} frames are damaged and were left out")
@@ -269,7 +275,7 @@ def _frames(data: bytes, lost: list[int]) -> Iterator[tuple[int, _Frame]]:
 def _of_frames(
     problems: Problems, frames: Iterator[tuple[int, _Frame]], stem: str,
     callsigns: dict[str, str],
-) -> Iterator[tuple[int, Report]]:  # fmt: skip
+) -> Iterator[tuple[int, PositionReport]]:  # fmt: skip
     attitude: dict[int, tuple[float, tuple[float, ...]]] = {}
     systems: dict[int, str] = {}
     last: dict[str, tuple[float, float]] = {}
@@ -293,7 +299,7 @@ def _of_frames(
             recent = angles if frame.time_s - at <= _LASTS_S else (None,) * 3
             track = math.degrees(math.atan2(east, north)) % 360.0
             speed = math.hypot(north, east) / 100.0
-            yield number, Report(
+            yield number, PositionReport(
                 name, frame.time_s, lat * 1e-7, lon * 1e-7, alt * 1e-3, None, track, speed,
                 -down / 100.0, *recent,
             )  # fmt: skip

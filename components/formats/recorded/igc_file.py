@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 
-from components.formats.reports import Log, Report
+from components.formats.reports import Log, PositionReport
 from components.formats.text_rows import Problems, lines_of
 
 _DATE = re.compile(r"HFDTE(?:DATE)?:?\s*(\d\d)(\d\d)(\d\d)", re.IGNORECASE)
@@ -40,7 +40,7 @@ def _name(lines: list[tuple[int, str]]) -> str:
 
 def _fixes(
     problems: Problems, lines: list[tuple[int, str]], name: str
-) -> Iterator[tuple[int, Report]]:
+) -> Iterator[tuple[int, PositionReport]]:
     day: datetime | None = None
     last_s = -1
     more: dict[str, slice] = {}
@@ -75,7 +75,9 @@ def _fixes(
             geometric = float(fix[12]) if fix[10] == "A" else None
             yield (
                 number,
-                Report(name, time_s, lat, lon, geometric, float(fix[11]) if pressed else None),
+                PositionReport(
+                    name, time_s, lat, lon, geometric, float(fix[11]) if pressed else None
+                ),
             )
 
 

@@ -27,7 +27,7 @@ _EVERYWHERE = (-90.0, 90.0, -180.0, 180.0)
 
 
 @dataclass(frozen=True)
-class Choice:
+class TrafficChoice:
     """What is taken of recorded files; see the parameters of ``traffic.file``.
 
     Parameters
@@ -71,7 +71,7 @@ class Choice:
     without: tuple[str, ...] = ()
 
 
-def read_traffic(paths: Sequence[Path], choice: Choice) -> TrafficFile:
+def read_traffic(paths: Sequence[Path], choice: TrafficChoice) -> TrafficFile:
     """Return the flights of recorded files, the ownship's first.
 
     TrafficFileError says all that is wrong.
@@ -86,7 +86,7 @@ def read_traffic(paths: Sequence[Path], choice: Choice) -> TrafficFile:
     kept = {}
     for name, columns in others.items():
         inside: Samples | None = within_time(columns, begin_s, end_s)
-        if inside is not None and (choice.box or choice.heights != Choice.heights):
+        if inside is not None and (choice.box or choice.heights != TrafficChoice.heights):
             inside = within_space(inside, choice.box or _EVERYWHERE, choice.heights)
         if inside is not None:
             kept[name] = inside
@@ -108,7 +108,7 @@ def _earliest(recording: Recording) -> float:
     return min((float(c["time"][0]) for c in recording.samples.values()), default=0.0)
 
 
-def _own(whole: Recording, choice: Choice, start_s: float) -> dict[str, Samples]:
+def _own(whole: Recording, choice: TrafficChoice, start_s: float) -> dict[str, Samples]:
     """Return the ownship's samples by its name, which no other aircraft has."""
     if choice.own_file is None:
         own = next(iter(whole.samples)) if choice.ownship is None else named(
@@ -136,7 +136,7 @@ def _own(whole: Recording, choice: Choice, start_s: float) -> dict[str, Samples]
     return {called: moved(columns, later_s, *choice.own_moved)}
 
 
-def _window(choice: Choice, start_s: float, own: dict[str, Samples]) -> tuple[float, float]:
+def _window(choice: TrafficChoice, start_s: float, own: dict[str, Samples]) -> tuple[float, float]:
     """Return from when to when aircraft are flown; for ever where nothing says an end."""
     begin_s, end_s = start_s, math.inf
     for columns in own.values():

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from typing import Any
 from xml.etree import ElementTree
 
-from components.formats.reports import Log, Report
+from components.formats.reports import Log, PositionReport
 from components.formats.text_rows import Problems
 
 
@@ -33,14 +33,14 @@ def xml_log(problems: Problems, data: bytes, stem: str) -> Log | None:
 _Point = tuple[str, str, str, str, str]
 
 
-def _points(problems: Problems, points: Iterator[_Point]) -> Iterator[tuple[int, Report]]:
+def _points(problems: Problems, points: Iterator[_Point]) -> Iterator[tuple[int, PositionReport]]:
     timed, number = 0, 0
     for number, (name, when, lon, lat, up) in enumerate(points, start=1):
         time_s = _instant(when)
         if when and time_s is None:
             problems.add(f"{when[:40]!r} is no date and time", line=number)
         timed += time_s is not None
-        yield number, Report(name, time_s, _float(lat), _float(lon), geometric=_float(up))
+        yield number, PositionReport(name, time_s, _float(lat), _float(lon), geometric=_float(up))
     if not timed:
         what = f"its {number} positions have" if number else "there are no positions that have"
         problems.fail(
