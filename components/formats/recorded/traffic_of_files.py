@@ -164,8 +164,9 @@ def _none_is_there(
     )
 
 
-#: Who stays nearer to the ownship than this, at so many of its samples, is the ownship itself.
-_ITSELF_M, _OFTEN = 150.0, 10
+#: Who stays nearer to the ownship than this, at so many of its samples, is the ownship itself. A
+#: pressure altitude and a geometric one may differ by as much as the third.
+_ITSELF_M, _OFTEN, _OF_ITS_HEIGHT_M = 150.0, 10, 500.0
 
 
 def _note_itself(file: TrafficFile) -> None:
@@ -180,7 +181,8 @@ def _note_itself(file: TrafficFile) -> None:
             own.lat_deg[here], own.lon_deg[here], own.alt_m[here], there.lat_deg[here],
             there.lon_deg[here], own.alt_m[here],
         )  # fmt: skip
-        if (median := float(np.median(apart))) < _ITSELF_M:
+        higher = float(np.median(np.abs(own.alt_m[here] - there.alt_m[here])))
+        if (median := float(np.median(apart))) < _ITSELF_M and higher < _OF_ITS_HEIGHT_M:
             file.warnings.append(
                 f"{craft.name} stays within {median:.0f} m of the ownship {own.name}: if it is its "
                 f"own transponder, without = [{craft.name!r}] leaves it out"

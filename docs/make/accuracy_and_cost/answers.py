@@ -42,8 +42,9 @@ STUDIES = (
         "Risk",
         "radar_and_camera_risk",
         ("nmac_risk_ratio", "well_clear_lost_risk_ratio"),
-        ("replicas=4000",),
+        ("replicas=2000",),
         ("blocks.camera.scan_rate_hz=0.5", "blocks.camera.enabled=false"),
+        block="tracker",
     ),
     AskedStudy("Scan rate", "radar_scan_rate", ("declaration_range_m.radar",), budgets=("500m",)),
     AskedStudy(
