@@ -107,7 +107,7 @@ def level(name, alt=1000, step=0.0005, lat=52.0, count=21, dt=1):
     [
         (level("b", 1200, lat=52.01), None, None),
         (level("b", 35_000, lat=52.01), None, "b: it flies at 35,000 m; are altitudes in feet"),
-        (level("b", 1200, step=0.05, lat=52.01), None, "m/s; are positions in degrees read as radians"),
+        (level("b", 1200, 0.05, 52.01), None, "m/s; are positions in degrees read as radians"),
         (
             [(t, "b", 52.01, 4 + t * 0.0005 + (0.002 if t == 9 else 0), 1000) for t in range(21)],
             None,
@@ -124,7 +124,7 @@ def level(name, alt=1000, step=0.0005, lat=52.0, count=21, dt=1):
             "are latitude and longitude in radians",
         ),
         (level("b", count=8), None, "1 of 1 intruders are there for only a part of the run's 20 s"),
-        (level("b", 1200, lat=52.01), 3600, "the ownship own is there for 20 s of the run's 3600 s; is time"),
+        (level("b", 1200, lat=52.01), 3600, "own is there for 20 s of the run's 3600 s; is time"),
     ],
 )
 def test_suspicious_flights_name_the_likely_error(scene, tmp_path, other, duration, text):
