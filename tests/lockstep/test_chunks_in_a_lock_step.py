@@ -15,8 +15,7 @@ from dsa_des.results.folder import undone_of
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies import attempts
 from dsa_des.studies.attempts import run_together
-from dsa_des.studies.chunk import run_chunk, run_chunks
-from dsa_des.studies.executors import Serial
+from dsa_des.studies.chunk import Done, run_chunk, run_chunks
 from dsa_des.studies.study import Chunk, Study
 from dsa_des.studies.study_file import study_of_tables
 
@@ -31,6 +30,10 @@ def study(per_chunk: int, runs: int = RUNS, **more: Any) -> Study:
     }  # fmt: skip
     scene = read_scene_file(CONFIGS / "benchmark" / "closed_loop_risk.toml")
     return study_of_tables(tables, scene, (), [("duration_s", 4), ("blocks.radar.range_km", 16)])
+
+
+def run_all(one: Study, chunks: Sequence[Chunk]) -> list[Done]:
+    return [done for some in run_together(one, chunks, 1) for done in run_chunks(one, some)]
 
 
 @pytest.fixture
@@ -54,7 +57,7 @@ def test_chunks_of_any_size_share_lock_steps_and_have_the_bytes_of_each_alone(
         of_size = study(per_chunk)
         chunks = list(of_size.chunks(0, [0]))
         del shared[:]
-        parts = list(Serial().run(of_size, chunks))
+        parts = run_all(of_size, chunks)
         assert shared == [RUNS]
         assert [part.content for part in parts] == [run_chunk(of_size, c).content for c in chunks]
         assert [part.runs for part in parts] == [len(chunk) for chunk in chunks]
@@ -70,10 +73,10 @@ def test_lock_steps_hold_what_memory_does_and_each_about_as_many(
     shared: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(replicas, "_MOST_TOGETHER", 4)
-    whole = list(Serial().run(one := study(RUNS), one.chunks(0, [0])))
+    whole = run_all(one := study(RUNS), list(one.chunks(0, [0])))
     assert shared == [4, 3, 3]
     del shared[:]
-    parts = list(Serial().run(one := study(2), one.chunks(0, [0])))
+    parts = run_all(one := study(2), list(one.chunks(0, [0])))
     assert shared == [4, 2, 4]
     tables = [pq.read_table(io.BytesIO(part.content)).to_pylist() for part in [*whole, *parts]]
     assert tables[0] == [row for table in tables[1:] for row in table]
