@@ -72,7 +72,7 @@ def test_chunks_of_any_size_share_lock_steps_and_have_the_bytes_of_each_alone(
 def test_lock_steps_hold_what_memory_does_and_each_about_as_many(
     shared: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(replicas, "_MOST_TOGETHER", 4)
+    monkeypatch.setattr(replicas, "_likely_bytes", lambda scene: replicas._MOST_BYTES / 4)
     whole = run_all(one := study(RUNS), list(one.chunks(0, [0])))
     assert shared == [4, 3, 3]
     del shared[:]
