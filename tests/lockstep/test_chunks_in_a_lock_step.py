@@ -1,6 +1,8 @@
 """Chunks are what is written at once; the lock steps that their runs share are another size."""
 
+import gc
 import io
+import tracemalloc
 from collections.abc import Sequence
 from typing import Any
 
@@ -80,6 +82,29 @@ def test_lock_steps_hold_what_memory_does_and_each_about_as_many(
     assert shared == [4, 2, 4]
     tables = [pq.read_table(io.BytesIO(part.content)).to_pylist() for part in [*whole, *parts]]
     assert tables[0] == [row for table in tables[1:] for row in table]
+
+
+def test_a_run_holds_about_what_it_is_taken_for() -> None:
+    """Of the benchmark's `risk`, whole: what more runs in a lock step hold more at its peak."""
+    one = study(1, 96, set={"duration_s": 180, "blocks.radar.range_km": 8})
+    scene, peaks = one.scene(0), list[int]()
+    replicas.run_replicas(scene, [one.replica(k) for k in range(2)], wanted={})
+    tracemalloc.start()
+    try:
+        for count in (32, 96):
+            some = [one.replica(k) for k in range(count)]
+            before = tracemalloc.get_traced_memory()[0]
+            tracemalloc.reset_peak()
+            with_flights: Any = replicas.lock_step(replicas.scenes_of(scene, some))
+            tracemalloc.reset_peak()
+            with_flights.run()
+            peaks.append(tracemalloc.get_traced_memory()[1] - before)
+            del with_flights
+            gc.collect()
+    finally:
+        tracemalloc.stop()
+    assert scene.duration_s == 180
+    assert peaks[1] - peaks[0] == pytest.approx(64 * replicas._likely_bytes(scene), rel=0.4)
 
 
 def test_every_worker_has_about_as_much() -> None:
