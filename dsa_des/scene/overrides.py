@@ -12,10 +12,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.class_text import sourced, type_text
 from dsa_des.block.component import Component, SourcedText, as_written
 from dsa_des.block.entry_points import COMPONENTS
-from dsa_des.block.registry import NotImported, UnknownType, find
+from dsa_des.block.registry import NotImported, UnknownType, find, sourced, type_text
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.files.toml_files import DEEPEST, NotToml, TomlError, parse_toml
 from dsa_des.scene.block_table import BlockOptions
