@@ -24,7 +24,8 @@ from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.axes import Axis, flatten_axes, label_of, parse_axis
 from dsa_des.studies.draws import Draw, flatten_draws, parse_draw
 from dsa_des.studies.metric import METRICS, find_metric
-from dsa_des.studies.study import MetricSpec, Splitting, Study, changed_scene
+from dsa_des.studies.splitting import Splitting
+from dsa_des.studies.study import MetricSpec, Study, changed_scene
 from dsa_des.studies.study_checks import check_cells
 from dsa_des.studies.study_tables import (
     AXES_OF_FIGURES,
