@@ -100,6 +100,9 @@ class Component:
     #: own code and of the effects that it lists, and of the classes of its package that derive
     #: from it: one of another package that does not say it again gets an instance for each run.
     lockstep: ClassVar[bool] = False
+    #: How many targets a row counts as at least, where windows of a single run are sized: what the
+    #: block makes of each row is there until its window ends.
+    least_width: ClassVar[int] = 4
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
     clocked: ClassVar[Literal["own", "demand"]] = "own"

@@ -297,7 +297,7 @@ class Node:
         ticks = wake.ticks
         if not self._all_ran:
             self._ran = ~self._idle_runs()
-            self._ran[wake.run] = True
+            self._ran[wake.run[wake.instants.first_of_each]] = True
             self._all_ran = bool(self._ran.all())
         try:
             self.send(self.runner.run(wake), wake.instants)
