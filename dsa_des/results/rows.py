@@ -31,6 +31,8 @@ from dsa_des.results.record import (
     STANDS_FOR,
     TRIALS,
     Result,
+    geometry_column,
+    predicted_column,
 )
 from dsa_des.results.statistics import (
     Estimate,
@@ -158,8 +160,8 @@ def _joined(pieces: list[Any]) -> AnyArray:
     return joined
 
 
-#: Below and above the line, weight, cluster, and for how many each stands.
-_Paired = tuple[FloatArray, FloatArray, FloatArray, AnyArray, FloatArray | None]
+#: Below and above the line, weight, cluster, for how many each stands, and what it was predicted.
+_Paired = tuple[FloatArray, FloatArray, FloatArray, AnyArray, FloatArray | None, FloatArray | None]
 
 
 class Rows:
@@ -195,6 +197,11 @@ class Rows:
         for cell, lost in self.stored.unheard.items():
             result = taken_over(result, lost, self.column("cell") == cell)
         return result
+
+    def predicted(self, event: str, rows: IntArray) -> FloatArray | None:
+        """Return with what an event counts in some rows before they are flown, if with anything."""
+        name = geometry_column(predicted_column(event))
+        return np.nan_to_num(self.column(name)[rows]) if name in self.stored.names else None
 
     def is_sampled(self, name: str) -> bool:
         """Return whether only runs that were flown have a result."""
@@ -286,7 +293,8 @@ class Rows:
         known = ~np.isnan(values) | (stands_for == 0.0)
         ratio = paired_ratio(
             np.ones(int(known.sum())), values[known], cluster=self.units[rows][known],
-            stands_for=stands_for[known], confidence=confidence,
+            stands_for=stands_for[known], predicted=self.predicted(result.name, rows[known]),
+            confidence=confidence,
         )  # fmt: skip
         low, high = ratio.interval
         ratio = replace(ratio, interval=(low, min(high, 1.0)))
@@ -300,11 +308,11 @@ class Rows:
         Runs of the same encounter, and of the same unit, hang together.
         """
         matches, used, missing = self._paired(result, rows)
-        below, above, weight, cluster, stands_for = matches
+        below, above, weight, cluster, stands_for, predicted = matches
         method = "bootstrap" if method == "bootstrap" else "gamma"
         together = cluster if len(np.unique(cluster)) < len(used) else None
         ratio = paired_ratio(
-            below, above, weight, cluster=together, stands_for=stands_for,
+            below, above, weight, cluster=together, stands_for=stands_for, predicted=predicted,
             confidence=confidence, method=method, resamples=_RESAMPLES,
         )  # fmt: skip
         if result.ratio is not None and result.ratio.share:
@@ -333,7 +341,8 @@ class Rows:
                 _, number = np.unique(cluster, return_inverse=True)
                 cluster = units * (int(number.max(initial=0)) + 1) + number
         some = None if stands_for is None else stands_for[known]
-        columns = below[known], above[known], weight[known], cluster[known], some
+        predicted = self.predicted(of.above, rows[known])
+        columns = below[known], above[known], weight[known], cluster[known], some, predicted
         return columns, rows[known], int((~known).sum())
 
     def ratio_difference(
@@ -353,14 +362,14 @@ class Rows:
         parts, ratios, cluster = [], [], sides[0][0][3][here]
         for (columns, _, _), common in zip(sides, (here, there), strict=True):
             below, above, weight = (column[common] for column in columns[:3])
-            some = None if columns[4] is None else columns[4][common]
+            some, predicted = (None if of is None else of[common] for of in columns[4:])
             ratio = paired_ratio(
-                below, above, weight, cluster=cluster, stands_for=some, confidence=confidence,
-                method="delta",
+                below, above, weight, cluster=cluster, stands_for=some, predicted=predicted,
+                confidence=confidence, method="delta",
             )  # fmt: skip
             ratios.append(ratio)
             if not ratio.reason:
-                parts.append(influences(below, above, weight, ratio.ratio, some))
+                parts.append(influences(below, above, weight, ratio.ratio, some, predicted))
         alone = [len(side[1]) - len(here) for side in sides]
         if len(parts) < 2:
             none = Estimate(np.nan, np.nan, np.nan, 0, True)
