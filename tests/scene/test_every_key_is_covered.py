@@ -42,7 +42,7 @@ UNCOVERED: dict[str, str] = {
         key: "an ownship is an aircraft as intruders are: tests/platforms compares both"
         for key in every_key()
         if (part := key.partition("ownship.")[2])
-        and part.partition(".")[0] in Aircraft.model_fields.keys()
+        and part.partition(".")[0] in Aircraft.model_fields
     },
     # The camera of pictures is one of these; what its own tests do not see.
     **{
