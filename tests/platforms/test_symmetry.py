@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pytest
-from platforms import PILOT, RADAR, TURN_AWAY, scene_of
+from equipped import PILOT, RADAR, TURN_AWAY, scene_of
 from same_runs import tables_of
 
 EKF = {"type": "tracking.ekf", "acceleration_intensity_m2_s3": 0.2}
@@ -30,16 +30,23 @@ def rows_of(table: pa.Table, own: str | None) -> list[tuple[Any, ...]]:
     return sorted(rows, key=repr)
 
 
+def test_who_is_called_ownship_makes_no_difference():
+    assert_it_makes_no_difference()
+
+
 @pytest.mark.parametrize(
     "how",
     [
-        {},
         {"radar": {**RADAR, "beam_sweep": True}, "tracker": EKF, "decider": PILOT},
         {"radar": RADAR, "tracker": EKF, "sections": NAVIGATION},
     ],
-    ids=["plain", "sweeping beam, filter and pilot", "drawn navigation"],
+    ids=["sweeping beam, filter and pilot", "drawn navigation"],
 )
-def test_who_is_called_ownship_makes_no_difference(how):
+def test_nor_does_it_where_much_is_drawn(how):
+    assert_it_makes_no_difference(**how)
+
+
+def assert_it_makes_no_difference(**how: Any) -> None:
     first = scene_of(A, [B, C], {"": None, "_b": "b"}, **how)
     second = scene_of(B, [A, C], {"": "a", "_b": None}, **how)
     (_, one), (_, other) = tables_of(first), tables_of(second)
