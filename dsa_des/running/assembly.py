@@ -1,24 +1,18 @@
 """The blocks of a scene, built and set up: with their neighbours known and their effects built."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any
 
 from dsa_des.block.component import Component, Consumer, Context, Producer
 from dsa_des.block.foreign_calls import REFUSALS, error_text, must_pass, why_refused
-from dsa_des.errors import (
-    BlockFailure,
-    Problem,
-    RunRefused,
-    SceneError,
-    SetupFailure,
-    did_you_mean,
-)
+from dsa_des.errors import BlockFailure, Problem, RunRefused, SceneError, SetupFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.effects import Planned, WrapEffect, build_effects
 from dsa_des.running.loops import telling_order
 from dsa_des.running.timeline import Timeline
+from dsa_des.scene.platforms import platforms_of
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK
@@ -87,62 +81,9 @@ class Assembly:
         return longest
 
     def _put_on_platforms(self) -> None:
-        """Say what carries each block: what its table names, or what carries those that feed it."""
-        known = [name for names in self._sources.values() for name in names]
-        problems: list[Problem] = []
-        left = sorted(self.components.keys() - self._sources)
-        for name in self.components:
-            said = self._scene.blocks[name].options.platform
-            if said is not None and (said not in known or name in self._sources):
-                problems.append(self._no_platform(name, known, said))
-            elif said is not None or name in left:
-                by_sources = self._first_of_sources(name)
-                self.components[name].context.platform = said or by_sources
-        _raise_any(problems)
-        found = True
-        while found:  # down the chains, around loops too
-            left = [name for name in left if not self.components[name].context.platform]
-            found = False
-            for name in left:
-                if feeding := self._feeding(name):
-                    self.components[name].context.platform = min(feeding)
-                    found = True
-        for name in left:
-            self.components[name].context.platform = next(iter(known), "")
-        for name in sorted(self.components.keys() - self._sources):
-            mine, feeding = self.components[name].context.platform, self._feeding(name)
-            for other in sorted(feeding.keys() - {mine}):
-                by = f"{feeding[mine]} feeds it" if mine in feeding else "its key platform says"
-                message = (
-                    f"is carried by {mine!r}, as {by}, and {feeding[other]} on {other!r} feeds it "
-                    "too: a block looks from one place; give each platform one of its own"
-                )
-                problems.append(self._scene.problem(f"blocks.{name}", message))
-        _raise_any(problems)
-
-    def _feeding(self, name: str) -> dict[str, str]:
-        """Return what carries the blocks that feed one, with the first of these on each."""
-        carrying: dict[str, str] = {}
-        for wire in self._scene.wires:
-            if wire.target == name and (on := self.components[wire.source].context.platform):
-                carrying.setdefault(on, wire.source)
-        return carrying
-
-    def _first_of_sources(self, name: str) -> str:
-        """Return what carries a block that nothing but sources feeds; empty for others."""
-        feeding = [wire.source for wire in self._scene.wires if wire.target == name]
-        alone = bool(feeding) and all(one in self._sources for one in feeding)
-        return self._sources[feeding[0]][0] if alone else ""
-
-    def _no_platform(self, name: str, known: Sequence[str], said: str) -> Problem:
-        """Return why what a block's table names cannot carry it."""
-        if name in self._sources:
-            why = "it moves all platforms and is on none: name it at the blocks that look from it"
-        elif known:
-            why = f"there is no such aircraft or place{did_you_mean(said, known)}"
-        else:
-            why = "no block of this scene says which aircraft there are"
-        return self._scene.refused(name, f"platform: {why}")
+        """Tell every block what carries it."""
+        for name, platform in platforms_of(self._scene, self._sources).items():
+            self.components[name].context.platform = platform
 
     def _offer_down_the_chain(self) -> None:
         """Tell every block what its producers offer, sources first: a block may pass it on.
