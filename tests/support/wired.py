@@ -59,7 +59,7 @@ def chain(
 def head_on_loop(
     radar: Mapping[str, Any], wire: Mapping[str, Any], *, north_m: float, **sections: Any
 ) -> dict[str, Any]:
-    """Return a closed loop: an aircraft comes head-on, and of its tracks one makes the ownship turn.
+    """Return a closed loop: an aircraft comes head-on, and one of its tracks makes us turn.
 
     `wire` says how the one to the avoidance delays or loses them.
     """
