@@ -165,7 +165,7 @@ def gain_text(line: Line) -> str:
     assert ratio is not None
     at = "".join(f"{short(value)}: " for value in line.at)
     said = f"{at}{line.result.name}: {ratio.flown:,} of {ratio.encounters:,} runs were flown"
-    if not ratio.gain > 0.0:
+    if ratio.reason or not ratio.gain > 0.0:
         return said
     if ratio.gain <= 1.0:
         return f"{said}; as wide an interval costs no more with all of them: nothing is gained"
