@@ -81,6 +81,8 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
         console.print(shortened(sentence, _LONGEST), markup=False, soft_wrap=True)
     if tables.rows.failed:
         console.print(f"{tables.rows.failed} runs failed; `error` and `command` of parts/ say why")
+        first = str(tables.rows.stored.failed[0]["error"])
+        console.print(shortened(f"the first: {first}", _LONGEST), markup=False, soft_wrap=True)
     if tables.rows.crashed:
         console.print(
             f"{tables.rows.crashed} of them crashed: the process that ran them died each time; "

@@ -174,9 +174,8 @@ def paired_ratio(
             flown=_many_flown(n, s),
         )  # fmt: skip
     above = math.fsum(y)
-    added = math.fsum(
-        w * _expanded(np.maximum(m - n, 0.0), s, None if d is None else d * (n == 0.0))
-    )
+    induced = _expanded(np.maximum(m - n, 0.0), s, None if d is None else d * (n == 0.0))
+    added = max(0.0, math.fsum(w * induced))
     left, ratio = above - added, above / below
     each, x, y = terms
     residual = y - ratio * x
