@@ -31,7 +31,9 @@ from scipy.stats import chi2
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "support"))
 
+import crooked
 from comparisons import difference, recorded
 from dice import Dice
 
@@ -155,7 +157,10 @@ def errors(run: Any, tables: Mapping[str, Any]) -> tuple[list[str], Nees]:
                 unit = ("m2", "m2_s", "m2_s2")[(i > 2) + (j > 2)]
                 spread[i, j] = spread[j, i] = row[f"covariance_{i}{j}_{unit}"]
         origin = [row[f"origin_{name}"] for name in ("lat_deg", "lon_deg", "alt_m")]
-        near = [_off(flight, row["state_s"], origin, state, spread) for flight in flights.values()]
+        own = np.array([row[f"own_{axis}_m"] for axis in ("north", "east")])
+        near = [
+            _off(flight, row["state_s"], origin, own, state, spread) for flight in flights.values()
+        ]
         away_m, sigmas, normalised, there = min(near)
         track = row["block"], row["track"]
         rows[track] += 1
@@ -172,9 +177,13 @@ def errors(run: Any, tables: Mapping[str, Any]) -> tuple[list[str], Nees]:
 
 
 def _off(
-    flight: Any, time_s: float, origin: list[float], state: Any, spread: Any
+    flight: Any, time_s: float, origin: list[float], own: Any, state: Any, spread: Any
 ) -> tuple[float, float, float, bool]:
-    """Return how far a state is from a straight flight: m, deviations, and as six quantities."""
+    """Return how far a state is from a straight flight: m, deviations, and as six quantities.
+
+    Deviations are the less of those along straight lines and along the circle about the ownship: a
+    bearing that is good to 9 degrees is off along an arc, which no covariance of positions has.
+    """
     times = flight[0]
     k = int(np.clip(np.searchsorted(times, time_s), 1, len(times) - 1))
     (t0, *one), (t1, *other) = flight[:, k - 1], flight[:, k]
@@ -182,11 +191,17 @@ def _off(
         np.array(pymap3d.geodetic2ned(*place, *origin), dtype=float) for place in (one, other)
     )
     velocity = (after - before) / (t1 - t0)
-    off = state - np.concatenate([before + velocity * (time_s - t0), velocity])
-    place = off[:3] @ np.linalg.solve(spread[:3, :3], off[:3])
-    there = bool(times[0] <= time_s <= times[-1])
+    true = before + velocity * (time_s - t0)
+    off = state - np.concatenate([true, velocity])
+    seen, there = (complex(*(place[:2] - own)) for place in (state, true))
+    along = seen / abs(seen) * complex(
+        abs(seen) - abs(there), abs(seen) * float(np.angle(seen / there))
+    )  # fmt: skip
+    on_arc = np.array([along.real, along.imag, off[2]])
+    place = min(one @ np.linalg.solve(spread[:3, :3], one) for one in (off[:3], on_arc))
     whole = off @ np.linalg.solve(spread, off)
-    return float(np.linalg.norm(off[:3])), float(np.sqrt(place)), float(whole), there
+    during = bool(times[0] <= time_s <= times[-1])
+    return float(np.linalg.norm(off[:3])), float(np.sqrt(place)), float(whole), during
 
 
 def judged(seed: int, *, same: bool = True, **keys: Any) -> tuple[str, Nees, set[str]]:
@@ -245,11 +260,19 @@ def main() -> None:
     parser.add_argument(
         "--every", type=int, default=10, help="scenes from one window=1 to the next"
     )
+    parser.add_argument("--aircraft", type=int, default=3, help="aircraft in each [3]")
+    parser.add_argument(
+        "--crooked", action="store_true", help="with an ownship that is banked, in the south"
+    )
     options = parser.parse_args()
+    ownship = crooked.OWNSHIP if options.crooked else None
     features: Counter[str] = Counter()
     parts, wrong, started = [], 0, time.monotonic()
     for seed in range(options.seed, options.seed + options.count):
-        found, more, has = judged(seed, same=seed % options.every == 0)
+        found, more, has = judged(
+            seed, same=seed % options.every == 0,
+            aircraft_count=options.aircraft, ownship=ownship,
+        )  # fmt: skip
         features.update(has)
         parts.append(more)
         if found:
