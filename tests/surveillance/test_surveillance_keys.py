@@ -277,6 +277,10 @@ def test_what_an_interrogator_offers_is_what_its_answers_have():
         assert offer.tells is (measurement != "exact")
         assert set(offer.lasting) == (set() if measurement == "exact" else {"range", "elevation"})
         assert bool(offer.told_errors) is (measurement != "exact")
+    # Far ones are asked every fifth time.
+    found = scene("surveillance.active", far_every=5)
+    offer = Simulation(dsa_des.load_scene(found)).components["sensor"].offer("detections")
+    assert offer.promises == ((np.inf, 5.0),)
 
 
 @pytest.mark.parametrize(
