@@ -5,20 +5,21 @@ ownship was told (`components.metrics.risk`); beside them stand the encounter's 
 class of its geometry. The ratios themselves are taken over all runs of a cell.
 """
 
-import math
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal, NamedTuple
+from collections.abc import Mapping
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from components.encounters.encounter_traffic import Encounter, ModelTraffic, SetTraffic
 from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class, pair_paths
-from components.metrics.losses import FlightsTogether, nearest_of, ways_of
+from components.metrics.losses import meeting_deg, nominal_geometry
 from components.metrics.risk import Mitigated, RiskParameters
-from components.metrics.separation import RelativeFlight, traffic_block
+from components.metrics.separation import traffic_block
+from components.well_clear.missed_cylinder import Missed, led_into, widened
 from components.well_clear.plane_pairs import Meetings, meetings
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.scene.block_table import Block
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import (
@@ -90,18 +91,14 @@ _EVENTS = ("nmac", "well_clear_lost")
 _KEPT, _COMMANDED, _NEEDLESS = "well_clear_kept_nominal", "manoeuvred", "needless_manoeuvre"
 # What is expected of manoeuvres before any is seen: the chance that an event stays, that one comes
 # which the nominal flights just miss, and that a manoeuvre is flown where well clear is just kept.
-# Turns move the ownship by some `_TURNED_M` and hardly up or down, climbs by `_CLIMBED_M` and
-# hardly to the side (`_SLACK` of a size). Wrong ones cost width, never truth
-# (`dsa_des.studies.allocation`).
+# Wrong ones cost width, never truth (`dsa_des.studies.allocation`).
 _STAYS, _INDUCED, _NEEDS = 0.2, 0.004, 0.1
-_TURNED_M, _CLIMBED_M, _SLACK = 250.0, 100.0, 0.15
+# A conflict that is foreseen late surely stays. What is done about it in a hurry leads elsewhere
+# more often than what is done in time, by these factors.
+_LATE_S, _RUSHED, _IN_TIME = 35.0, 10.0, 0.3
 _LEAST_SIZES = 0.01
 # No sector of courses or bearings is so narrow, degrees.
 _WIDE_DEG = 35.0
-# How far apart distances are looked at to choose runs by.
-_COARSE_S = 1.0
-# Courses are taken over this time to both sides of the closest approach.
-_BASE_S = 0.5
 
 
 class RiskRatioParameters(RiskParameters):
@@ -125,7 +122,7 @@ class RiskRatios(Mitigated):
 
     Parameters = RiskRatioParameters
     geometry = (
-        "closest_s", "horizontal_miss_m", "vertical_miss_m", "relative_speed_mps",
+        "closest_s", "horizontal_miss_m", "vertical_miss_m", "relative_speed_mps", "foreseen_s",
         "course_along", "course_across", "bearing_ahead", "bearing_right",
         "log_miss_in_nmac_sizes", "log_miss_in_well_clear_sizes",
         *(expected_column(name) for name in (*(f"{e}_mitigated" for e in _EVENTS), _NEEDLESS)),
@@ -202,9 +199,11 @@ class RiskRatios(Mitigated):
         meeting, sizes_m = met_in_plane(group, self.p), self.p.sizes_m
         if meeting is None:
             result = self._of_nominal(group)
-            closest = self.of_flights(group, nominal_geometry, steered=False)
+            geometry = partial(nominal_geometry, widened(sizes_m))
+            closest, *misses_m = np.split(self.of_flights(group, geometry, steered=False), [7, 9])
         else:
             closest, result = meeting.closest, self._of_meeting(meeting)
+            misses_m = [meeting.beside_m, meeting.above_m]
             unsure = np.flatnonzero(meeting.unsure.any(axis=0) | self._between_classes(meeting))
             if len(unsure):
                 few = Group(group.scene, [group.replicas[k] for k in unsure.tolist()], (), {})
@@ -223,11 +222,15 @@ class RiskRatios(Mitigated):
         )
         for name, sizes in (("well_clear", clear), ("nmac", nmac)):
             result[f"log_miss_in_{name}_sizes"] = np.log(np.maximum(sizes, _LEAST_SIZES))
-        for event, limits in zip(("well_clear_lost", "nmac"), sizes_m, strict=True):
-            there = result[f"{event}_nominal"] > 0.0
-            induced = _INDUCED * led_into(limits, values[1], values[2], climbs=self._climbs)
-            result[expected_column(f"{event}_mitigated")] = np.where(there, _STAYS, induced)
+        late = np.nan_to_num(np.exp(-((result["foreseen_s"] / _LATE_S) ** 2)))
         kept = 1.0 - result["well_clear_lost_nominal"]
+        rushed = np.where(kept > 0.0, 1.0, _IN_TIME + (_RUSHED - _IN_TIME) * late)
+        for k, event in enumerate(("well_clear_lost", "nmac")):
+            there = result[f"{event}_nominal"] > 0.0
+            missed = Missed(values[1], values[2], misses_m[0][k], misses_m[1][k])
+            induced = _INDUCED * rushed * led_into(sizes_m[k], missed, climbs=self._climbs)
+            stays = _STAYS + (1.0 - _STAYS) * late
+            result[expected_column(f"{event}_mitigated")] = np.where(there, stays, induced)
         alone = np.maximum(np.nan_to_num(clear, nan=np.inf), 1.0)
         result[expected_column(_NEEDLESS)] = kept * _NEEDS * alone**-8.0
         return result
@@ -238,7 +241,7 @@ class RiskRatios(Mitigated):
 
     def _of_meeting(self, meeting: Meetings) -> dict[str, AnyArray]:
         """Return the same of paths in the plane, as far as these are sure."""
-        return _events_of(meeting) | self._named(*meeting.closest[4:])
+        return _events_of(meeting) | self._named(*meeting.closest[5:])
 
     def _between_classes(self, meeting: Meetings) -> BoolArray:
         """Return of which runs the plane does not tell the classes."""
@@ -290,43 +293,11 @@ def may_climb(block: Block) -> bool:
     return asked is None or bool(asked(block.parameters))
 
 
-def led_into(
-    size_m: tuple[float, float], level_m: FloatArray, up_m: FloatArray, *, climbs: bool
-) -> FloatArray:
-    """Return how likely it is that a manoeuvre leads into a cylinder that is just missed, to 1.
-
-    Of encounters that pass so far to the side and above; 0 where nobody is met.
-    """
-    limits = zip((level_m, up_m), size_m, strict=True)
-    level, up = (np.maximum(np.nan_to_num(at, nan=np.inf) - size, 0.0) for at, size in limits)
-    radius_m, half_m = size_m
-    turned = np.exp(-((level / _TURNED_M) ** 2) - (up / (_SLACK * half_m)) ** 2)
-    climbed = np.exp(-((level / (_SLACK * radius_m)) ** 2) - (up / _CLIMBED_M) ** 2)
-    result: FloatArray = np.maximum(turned, climbed) if climbs else turned
-    return result
-
-
 def side_of(bearing_deg: FloatArray) -> AnyArray:
     """Return in which sector of 90° each bearing lies: ahead, right, behind or left."""
     sector = np.floor((np.nan_to_num(bearing_deg) + 45.0) % 360.0 / 90.0).astype(int)
     result: AnyArray = np.array(BEARINGS)[sector]
     return result
-
-
-def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return course and bearing (2, runs) of the nearest intruder at the closest approach, degrees.
-
-    Course: the intruder's less the ownship's. Bearing from where the intruder closes in, clockwise
-    from the ownship's course: opposite to its velocity relative to the ownship. NaN where they
-    never meet.
-    """
-    flights = [flight for run in runs for flight in run]
-    nearest = _nearest_of_each(runs, *nearest_of(flights))
-    angles = np.full((2, len(runs)), np.nan)
-    angles[:, nearest.runs] = _angles_deg(
-        *ways_of([flights[k] for k in nearest.flights], nearest.time_s, _BASE_S)
-    )
-    return angles
 
 
 def met_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
@@ -339,76 +310,9 @@ def met_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
         or one.scripted_ownship is not None
         or p.step_s is not None
         or p.tau_s > 0.0
+        or p.platform is not None
         or any(r.changes.keys() - {f"blocks.{block.name}.encounter"} for r in group.replicas)
     ):
         return None
     paths, end_s = pair_paths(encounters_of(group), one.dynamics), float(scene.duration_s or "inf")
-    return meetings(paths, len(group), end_s, p.sizes_m)
-
-
-def nominal_geometry(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return about how the nearest intruder of each run is met, (6, runs); NaN where none is.
-
-    Time (s), horizontal and vertical distance (m) and relative speed in the level plane (m/s) at
-    the closest approach, then course and bearing (`meeting_deg`), degrees. Distances are looked at
-    every `_COARSE_S`: enough to choose runs by.
-    """
-    flights = [flight for run in runs for flight in run]
-    result = np.full((6, len(runs)), np.nan)
-    if not flights:
-        return result
-    together = FlightsTogether(flights)
-    many = 1 + int(max(flight.end_s for flight in flights) / _COARSE_S)
-    times_s, every = _COARSE_S * np.arange(many), np.arange(len(flights))
-    level_m, up_m = (
-        part.reshape(len(flights), many)
-        for part in together.level_distances_m(
-            np.repeat(every, many), np.tile(times_s, len(flights))
-        )
-    )
-    range_m = np.hypot(level_m, up_m)
-    index = np.argmin(range_m, axis=1)
-    nearest = _nearest_of_each(runs, range_m[every, index], times_s[index])
-    some, time_s = nearest.flights, nearest.time_s
-    own_m, other_m = ways_of([flights[k] for k in some], time_s, _BASE_S)
-    speed_mps = np.hypot(*(other_m - own_m)) / (2.0 * _BASE_S)
-    result[0, nearest.runs] = time_s
-    result[1, nearest.runs] = level_m[some, index[some]]
-    result[2, nearest.runs] = up_m[some, index[some]]
-    result[3, nearest.runs] = speed_mps
-    result[4:, nearest.runs] = _angles_deg(own_m, other_m)
-    return result
-
-
-class _Nearest(NamedTuple):
-    """Runs in which somebody is met, and of each whose flight is nearest, and when."""
-
-    runs: list[int]
-    flights: IntArray
-    time_s: FloatArray
-
-
-def _nearest_of_each(
-    runs: Sequence[list[RelativeFlight]], distance_m: FloatArray, time_s: FloatArray
-) -> _Nearest:
-    met: list[int] = []
-    nearest: list[int] = []
-    start = 0
-    for number, run in enumerate(runs):
-        index = start + int(np.argmin(distance_m[start : start + len(run)])) if run else start
-        if run and np.isfinite(distance_m[index]):
-            met.append(number)
-            nearest.append(index)
-        start += len(run)
-    chosen = np.array(nearest, dtype=np.int64)
-    return _Nearest(met, chosen, time_s[chosen])
-
-
-def _angles_deg(own_m: FloatArray, other_m: FloatArray) -> FloatArray:
-    """Return course and bearing (2, flights) of intruders, by how both move, degrees."""
-    angles = np.empty((2, own_m.shape[1]))
-    for number, (own, other) in enumerate(zip(own_m.T.tolist(), other_m.T.tolist(), strict=True)):
-        course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]
-        closing = math.degrees(math.atan2(own[1] - other[1], own[0] - other[0]))
-        angles[:, number] = (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0
-    return angles
+    return meetings(paths, len(group), end_s, p.sizes_m, widened(p.sizes_m))

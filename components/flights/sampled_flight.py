@@ -256,17 +256,8 @@ class SampledFleet(Fleet):
 
     @cached_property
     def _table(self) -> FloatArray:
-        """What is known of each segment, one after the other: in a row of the memory.
-
-        From now on each flight's own are a part of it: of many flights they are most of the memory.
-        """
-        table = _side_by_side([flight.coefficients for flight in self._flights])
-        end = 0
-        for flight in self._flights:
-            rows, count = flight.coefficients.shape
-            flight.coefficients = table[end : end + count, :rows].T
-            end += count
-        return table
+        """What is known of each segment, one after the other: in a row of the memory."""
+        return _side_by_side([flight.coefficients for flight in self._flights])
 
     @cached_property
     def _away(self) -> BoolArray | None:

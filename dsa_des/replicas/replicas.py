@@ -22,7 +22,7 @@ from dsa_des.scene.scene import Scene
 _MOST_BYTES = 150e6
 # What one holds: tracks and tables whatever it is, a flight's samples, what is made of a scan.
 # 59 to 165 kB were measured of five closed and open loops of 120 and 180 s, 360 to 3240 scans.
-_BYTES, _BYTES_PER_S, _BYTES_PER_SCAN = 40e3, 300.0, 25.0
+_BYTES, _BYTES_PER_S, _BYTES_PER_SCAN = 40e3, 550.0, 25.0
 _A_LONG_RUN_S = 3600.0
 #: Which columns of which tables are recorded; None records everything.
 Wanted = Mapping[str, Collection[str]] | None

@@ -14,14 +14,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.results.folder import StudyFolder
-from dsa_des.results.ratio import (
-    PairedRatio,
-    influences,
-    paired_ratio,
-    taken_over,
-    unseen_variance,
+from dsa_des.results.differences import (
+    EstimatedDifference,
+    RatioTerms,
+    difference,
+    estimate_of,
+    paired_units,
+    quantile_difference,
+    ratio_difference,
 )
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.ratio import PairedRatio, paired_ratio, sampled_share, taken_over
 from dsa_des.results.record import (
     CRASHED,
     EVENT,
@@ -31,17 +34,16 @@ from dsa_des.results.record import (
     STANDS_FOR,
     TRIALS,
     Result,
+    geometry_column,
+    predicted_column,
 )
 from dsa_des.results.statistics import (
     Estimate,
-    EstimatedDifference,
     fraction,
     mean,
-    normal_error,
     quantile,
     rare,
     share,
-    symmetric,
 )
 
 if TYPE_CHECKING:
@@ -158,10 +160,6 @@ def _joined(pieces: list[Any]) -> AnyArray:
     return joined
 
 
-#: Below and above the line, weight, cluster, and for how many each stands.
-_Paired = tuple[FloatArray, FloatArray, FloatArray, AnyArray, FloatArray | None]
-
-
 class Rows:
     """The rows of a study as columns, and how they fall into places and units."""
 
@@ -195,6 +193,11 @@ class Rows:
         for cell, lost in self.stored.unheard.items():
             result = taken_over(result, lost, self.column("cell") == cell)
         return result
+
+    def predicted(self, event: str, rows: IntArray) -> FloatArray | None:
+        """Return with what an event counts in some rows before they are flown, if with anything."""
+        name = geometry_column(predicted_column(event))
+        return np.nan_to_num(self.column(name)[rows]) if name in self.stored.names else None
 
     def is_sampled(self, name: str) -> bool:
         """Return whether only runs that were flown have a result."""
@@ -284,12 +287,11 @@ class Rows:
         assert self.stands_for is not None
         values, stands_for = self.column(result.name)[rows].astype(float), self.stands_for[rows]
         known = ~np.isnan(values) | (stands_for == 0.0)
-        ratio = paired_ratio(
-            np.ones(int(known.sum())), values[known], cluster=self.units[rows][known],
-            stands_for=stands_for[known], confidence=confidence,
+        ratio = sampled_share(
+            np.ones(int(known.sum())), values[known], np.ones(int(known.sum())),
+            stands_for[known], cluster=self.units[rows][known],
+            predicted=self.predicted(result.name, rows[known]), confidence=confidence,
         )  # fmt: skip
-        low, high = ratio.interval
-        ratio = replace(ratio, interval=(low, min(high, 1.0)))
         return estimate_of(ratio), int((~known).sum())
 
     def ratio(
@@ -299,20 +301,24 @@ class Rows:
 
         Runs of the same encounter, and of the same unit, hang together.
         """
-        matches, used, missing = self._paired(result, rows)
-        below, above, weight, cluster, stands_for = matches
+        terms, used, missing = self._paired(result, rows)
+        below, above, weight, cluster, stands_for, predicted = terms
         method = "bootstrap" if method == "bootstrap" else "gamma"
         together = cluster if len(np.unique(cluster)) < len(used) else None
-        ratio = paired_ratio(
-            below, above, weight, cluster=together, stands_for=stands_for,
-            confidence=confidence, method=method, resamples=_RESAMPLES,
-        )  # fmt: skip
-        if result.ratio is not None and result.ratio.share:
+        options: dict[str, Any] = {
+            "cluster": together, "predicted": predicted, "confidence": confidence,
+            "method": method, "resamples": _RESAMPLES,
+        }  # fmt: skip
+        is_share = result.ratio is not None and result.ratio.share
+        if is_share and stands_for is not None:
+            return sampled_share(below, above, weight, stands_for, **options), missing
+        ratio = paired_ratio(below, above, weight, stands_for=stands_for, **options)
+        if is_share:
             low, high = ratio.interval
             ratio = replace(ratio, interval=(low, min(high, 1.0)))
         return ratio, missing
 
-    def _paired(self, result: Result, rows: IntArray) -> tuple["_Paired", IntArray, int]:
+    def _paired(self, result: Result, rows: IntArray) -> tuple[RatioTerms, IntArray, int]:
         """Return the columns of a ratio over the rows that have all of them, and those rows."""
         of = result.ratio
         assert of is not None
@@ -332,57 +338,41 @@ class Rows:
             if self.over:  # one encounter's number means another in another file
                 _, number = np.unique(cluster, return_inverse=True)
                 cluster = units * (int(number.max(initial=0)) + 1) + number
-        some = None if stands_for is None else stands_for[known]
-        columns = below[known], above[known], weight[known], cluster[known], some
-        return columns, rows[known], int((~known).sum())
+        predicted = self.predicted(of.above, rows)
+        terms = RatioTerms(below, above, weight, cluster, stands_for, predicted).of(known)
+        return terms, rows[known], int((~known).sum())
 
-    def ratio_difference(
+    def common(self, first: IntArray, second: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the rows, of two sets of them, of the runs that both have, in pairs."""
+        runs = self.runs
+        _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
+        return first[here], second[there]
+
+    def paired(
+        self, name: str, first: IntArray, second: IntArray
+    ) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Return the units that both sets of rows have, and the values of each in both."""
+        values, (one, two) = self.column(name), self.common(first, second)
+        return paired_units(self.units[one], values[one].astype(float), values[two].astype(float))
+
+    def difference(
+        self, result: Result, first: IntArray, second: IntArray, confidence: float, method: str
+    ) -> EstimatedDifference:
+        """Return how a result differs between two conditions, on the runs that both have."""
+        if result.kind == RATIO:
+            return self._ratio_difference(result, first, second, confidence)
+        _, one, two = self.paired(result.name, first, second)
+        if result.quantile is not None:
+            return quantile_difference(one, two, result.quantile, confidence)
+        return difference(one, two, confidence, method, kind=result.kind)
+
+    def _ratio_difference(
         self, result: Result, first: IntArray, second: IntArray, confidence: float
     ) -> EstimatedDifference:
-        """Return how a ratio differs between two conditions on the same runs, by their influences.
-
-        What each run adds to the error of either ratio is subtracted run by run, so what they
-        share falls out; the interval is that of the normal distribution. Its variance holds one
-        run more that gains the event and one that loses it, of the weight of those below the line:
-        as Bonett and Price do for events without weights (`statistics.difference`), so that runs
-        which all agree still leave as much open as so many can.
-        """
-        sides = [self._paired(result, rows) for rows in (first, second)]
-        one, two = (self.runs[side[1]] for side in sides)
-        _, here, there = np.intersect1d(one, two, return_indices=True)
-        parts, ratios, cluster = [], [], sides[0][0][3][here]
-        for (columns, _, _), common in zip(sides, (here, there), strict=True):
-            below, above, weight = (column[common] for column in columns[:3])
-            some = None if columns[4] is None else columns[4][common]
-            ratio = paired_ratio(
-                below, above, weight, cluster=cluster, stands_for=some, confidence=confidence,
-                method="delta",
-            )  # fmt: skip
-            ratios.append(ratio)
-            if not ratio.reason:
-                parts.append(influences(below, above, weight, ratio.ratio, some))
-        alone = [len(side[1]) - len(here) for side in sides]
-        if len(parts) < 2:
-            none = Estimate(np.nan, np.nan, np.nan, 0, True)
-            return EstimatedDifference(none, none, *alone)
-        _, index = np.unique(cluster, return_inverse=True)
-        each = np.array([np.bincount(index, weights=part) for part in parts])
-        value, few = ratios[1].ratio - ratios[0].ratio, any(ratio.few for ratio in ratios)
-        events = np.bincount(index, weights=weight * below).astype(float)
-        more = 2.0 * unseen_variance(events)
-        joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + more))
-        # A ratio whose runs all agree has no such error; its interval tells another.
-        alike = sum(
-            normal_error(estimate_of(ratio), confidence) ** 2
-            for ratio, part in zip(ratios, each, strict=True)
-            if np.abs(part).max() < 1e-12
-        )
-        apart = float(np.sqrt((each**2).sum() + alike + more))
-        return EstimatedDifference(
-            symmetric(value, joint, each.shape[1], few, confidence),
-            symmetric(value, apart, each.shape[1], few, confidence),
-            *alone,
-        )
+        (one, mine, _), (two, other, _) = (self._paired(result, rows) for rows in (first, second))
+        _, here, there = np.intersect1d(self.runs[mine], self.runs[other], return_indices=True)
+        alone = len(mine) - len(here), len(other) - len(there)
+        return ratio_difference(one.of(here), two.of(there), alone, confidence)
 
     def event_ratio(
         self, name: str, first: IntArray, second: IntArray, weight: str | None, confidence: float
@@ -398,9 +388,7 @@ class Rows:
             if weight is not None:
                 known &= ~np.isnan(self.column(weight)[rows].astype(float))
             sides.append(rows[known])
-        one, two = (self.runs[rows] for rows in sides)
-        _, here, there = np.intersect1d(one, two, return_indices=True)
-        below, above = sides[0][here], sides[1][there]
+        below, above = self.common(*sides)
         weights = None if weight is None else self.column(weight)[below].astype(float)
         return paired_ratio(
             self.column(name)[below].astype(float), self.column(name)[above].astype(float),
@@ -415,47 +403,5 @@ class Rows:
         return tuple(sorted(Counter(said).items()))
 
 
-def estimate_of(ratio: PairedRatio) -> Estimate:
-    """Return a ratio as the summary's other lines are."""
-    return Estimate(ratio.ratio, *ratio.interval, ratio.clusters, ratio.few)
-
-
 def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
-
-
-def paired(
-    rows: Rows, name: str, first: IntArray, second: IntArray
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the units that both sets of rows have, and the values of each in both."""
-    values, runs = rows.column(name), rows.runs
-    _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
-    one, two = first[here], second[there]
-    return paired_units(rows.units[one], values[one].astype(float), values[two].astype(float))
-
-
-def paired_units(
-    units: IntArray, first: FloatArray, second: FloatArray
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return units, and each one's mean value in two conditions, over runs that have both.
-
-    Of a unit without such a run one condition keeps its mean, and the other has no value: runs
-    with a value on one side only would compare other draws.
-
-    A run without a value has NaN.
-    """
-    result, index = np.unique(units, return_inverse=True)
-
-    def means(values: FloatArray, used: AnyArray) -> FloatArray:
-        many = np.bincount(index[used], minlength=len(result))
-        total = np.bincount(index[used], weights=values[used], minlength=len(result))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.where(many > 0, total / many, np.nan)
-
-    here, there = ~np.isnan(first), ~np.isnan(second)
-    one, two = means(first, here & there), means(second, here & there)
-    without = np.isnan(one)
-    alone = np.where(without, means(first, here), np.nan)
-    one = np.where(without, alone, one)
-    two = np.where(without & np.isnan(alone), means(second, there), two)
-    return result, one, two

@@ -12,7 +12,9 @@ from dsa_des.record.recording import Recorder
 from dsa_des.running.effects import Planned, WrapEffect, build_effects
 from dsa_des.running.loops import telling_order
 from dsa_des.running.timeline import Timeline
+from dsa_des.scene.platforms import platforms_of
 from dsa_des.scene.scene import Scene
+from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK
 
 
@@ -37,6 +39,9 @@ class Assembly:
         self._place = telling_order(scene.graph, scene.classes)
         self.components = self._build(timeline, recorder)
         self.duration_s = self._duration()
+        #: Blocks that move what carries others, and the names of that.
+        self._sources = {n: names for n, c in self.components.items() if (names := c.platforms())}
+        self._put_on_platforms()
         self._offer_down_the_chain()
         self.plan = self._plan_effects(wrap_effect)
         self._set_up()
@@ -75,6 +80,11 @@ class Assembly:
             raise SceneError([self._scene.problem("duration_s", message)])
         return longest
 
+    def _put_on_platforms(self) -> None:
+        """Tell every block what carries it."""
+        for name, platform in platforms_of(self._scene, self._sources).items():
+            self.components[name].context.platform = platform
+
     def _offer_down_the_chain(self) -> None:
         """Tell every block what its producers offer, sources first: a block may pass it on.
 
@@ -85,14 +95,23 @@ class Assembly:
                 Producer(
                     wire.source,
                     wire.input,
-                    self._asked(wire.source, "offer", wire.output),
+                    self._offer(wire),
                     wire.total_delay_s + Fraction(wire.jitter_s),
                     Fraction(wire.jitter_s),
                     wire.queued or wire.delay_scans > 0,
+                    self.components[wire.source].context.platform,
                 )
                 for wire in self._scene.wires
                 if wire.target == name
             ]
+
+    def _offer(self, wire: Wire) -> Any:
+        """Return what is offered over a wire, as what carries the receiver has it."""
+        offer = self._asked(wire.source, "offer", wire.output)
+        carrying = self.components[wire.target].context.platform
+        if carrying in self._sources.get(wire.source, ()):
+            return offer.seen_from(carrying)
+        return offer
 
     def _plan_effects(self, wrap: WrapEffect | None) -> list[Planned]:
         """Decide which effects exist in this run and build them."""
@@ -113,7 +132,12 @@ class Assembly:
         for name in sorted(self.components, key=lambda name: (-self._place[name], name)):
             component = self.components[name]
             component.context.consumers = [
-                Consumer(wire.target, wire.input, self._asked(wire.target, "request", wire.input))
+                Consumer(
+                    wire.target,
+                    wire.input,
+                    self._asked(wire.target, "request", wire.input),
+                    self.components[wire.target].context.platform,
+                )
                 for wire in self._scene.wires
                 if wire.source == name
             ]

@@ -24,10 +24,16 @@ class BlockOptions(Parameters):
     processor: str | None = Field(
         default=None, description="Shared processor that its messages go through."
     )
+    platform: str | None = Field(
+        default=None,
+        description="Name of the aircraft or place that carries it; by default that of the blocks "
+        "that feed it, else the ownship.",
+    )
     acknowledged: list[str] = Field(
         default=[],
         description="Notes on this block that are known and meant, each by how it begins (a key's "
-        "name, mostly): they are not said again.",
+        "name, mostly), or what it says behind a colon, of a file or an aircraft: they are not "
+        "said again.",
     )
 
 

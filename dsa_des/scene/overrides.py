@@ -12,10 +12,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.class_text import sourced, type_text
 from dsa_des.block.component import Component, SourcedText, as_written
 from dsa_des.block.entry_points import COMPONENTS
-from dsa_des.block.registry import NotImported, UnknownType, find
+from dsa_des.block.registry import NotImported, UnknownType, find, sourced, type_text
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.files.toml_files import DEEPEST, NotToml, TomlError, parse_toml
 from dsa_des.scene.block_table import BlockOptions
@@ -136,12 +135,16 @@ def apply_changes(
     return dropped
 
 
-def apply_sets(scene: SceneFile, assignments: Iterable[str]) -> None:
-    """Apply all ``--set`` to tables."""
+def apply_sets(study: SceneFile, assignments: Iterable[str]) -> None:
+    """Apply all ``--set`` to a study's tables; blocks are its scene's, below ``set``."""
     values, problems = read_sets(assignments)
-    scene.problems += problems
+    study.problems += problems
     for text, value in values:
-        scene.problems += _set_value(scene, text, value, COMMAND_LINE)
+        if text.startswith("blocks."):
+            message = f"is a key of the study's scene: set.{text}"
+            study.problems.append(Problem(COMMAND_LINE, text, message))
+        else:
+            study.problems += _set_value(study, text, value, COMMAND_LINE)
 
 
 def _set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:

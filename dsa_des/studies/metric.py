@@ -13,11 +13,11 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
-from dsa_des.block.class_text import ClassText
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import NotImportable, load_named, load_point
 from dsa_des.block.message import Columns, Text
+from dsa_des.block.registry import ClassText
 from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.drawn_columns import ReplicaScenes, scenes_of

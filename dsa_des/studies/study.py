@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.block.class_text import sourced
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
+from dsa_des.block.registry import sourced
 from dsa_des.block.source_file import absolute
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.record import FigureRecord, Requirement, StopWhen, as_text, run_command

@@ -5,7 +5,7 @@ import pytest
 
 from components.flights.legs import Straight, Turn
 from components.flights.many_flights import MixedFleet, SteeredFlight
-from components.flights.sampled_flight import SampledFleet, SampledTrajectory
+from components.flights.sampled_flight import SampledTrajectory
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.messages.steering import Manoeuvre
 
@@ -35,24 +35,6 @@ def test_sampled_together_are_those_made_alone():
             assert getattr(together[k], name).tobytes() == getattr(alone, name).tobytes(), name
         assert together[k].max_speed_mps == alone.max_speed_mps
         assert together[k].name == alone.name
-
-
-def test_what_is_known_of_segments_is_in_memory_once():
-    lat, lon, alt = paths(5, np.random.default_rng(5))
-    flights = SampledTrajectory.together([f"a{k}" for k in range(4)], TIMES, *(
-        part[:, :4] for part in (lat, lon, alt)
-    ))  # fmt: skip
-    none, north = np.zeros(len(TIMES)), np.full(len(TIMES), 50.0)  # measured velocities: more rows
-    due_north = TIMES, -66.0 + 50.0 * TIMES / 111_500.0, none, none
-    flights.append(SampledTrajectory("b", *due_north, velocity_enu_mps=(none, north, none)))
-    before = [flight.coefficients.copy() for flight in flights]
-    alone = [flight.at(TIMES + 0.3) for flight in flights]
-    assert len({part.shape for part in before}) == 2
-    table = SampledFleet(flights)._table
-    for flight, known, state in zip(flights, before, alone, strict=True):
-        assert np.shares_memory(flight.coefficients, table)
-        assert flight.coefficients.tobytes() == known.tobytes()
-        same(flight.at(TIMES + 0.3), state)
 
 
 def test_a_bad_sample_of_one_names_it():

@@ -5,9 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from dsa_des.results import statistics
+from dsa_des.results import differences, statistics
 from dsa_des.results.labels import AxisName, axis_label, readable, signed, unit_of, value_label
 from dsa_des.results.printing import rounded
+from dsa_des.results.record import NUMBER, Result
+from dsa_des.results.report import _line
+from dsa_des.results.summary import Line
 
 
 @pytest.mark.parametrize(
@@ -35,14 +38,14 @@ def test_a_mean_of_fractions_and_a_difference_of_shares_have_possible_intervals(
     assert both[0].half_width == pytest.approx(both[1].half_width, rel=0.01)
     alike = statistics.fraction(np.ones(20), 0.95)
     assert (alike.low, alike.high) == pytest.approx((1.0 - 0.1611, 1.0), abs=5e-5)
-    found = statistics.difference(np.zeros(3), np.array([0.9, 0.2, 1.0]), 0.95, kind="fraction")
+    found = differences.difference(np.zeros(3), np.array([0.9, 0.2, 1.0]), 0.95, kind="fraction")
     assert (found.paired.high, found.unpaired.high) == (1.0, 1.0) and found.paired.value < 0.8
 
 
 def test_missing_values_are_counted_and_left_out() -> None:
     first = np.array([1.0, np.nan, 3.0, 4.0])
     second = np.array([2.0, 2.0, np.nan, 6.0])
-    found = statistics.difference(first, second, 0.95)
+    found = differences.difference(first, second, 0.95)
     assert (found.paired.count, found.only_first, found.only_second) == (2, 1, 1)
     assert found.paired.value == 1.5
     assert math.isnan(statistics.mean(np.array([np.nan]), 0.95).value)
@@ -111,3 +114,20 @@ def test_axes_of_figures_carry_units() -> None:
     assert value_label("ir.rate_error_ppm", 100) == "IR rate error 100 ppm"
     assert value_label("swap.fusion", "fusion.gated") == "fusion.gated"
     assert unit_of("declaration_time_s.any") == "s" and unit_of("track_breaks") == ""
+
+
+@pytest.mark.parametrize(
+    ("exact", "said"),
+    [
+        (False, ("Declaration range, radar (m)", "1,235", "1,200 to 1,269 *")),
+        (True, ("declaration_range_m.radar", "1234.6", "1200.1 to 1269 *")),
+    ],
+)
+def test_a_line_of_the_report_is_in_words_and_rounded_or_as_its_table_has_it(
+    exact: bool, said: tuple[str, ...]
+) -> None:
+    estimate = statistics.Estimate(1234.567, 1200.1, 1269.03, 12, True)
+    result = Result("declaration_range_m.radar", NUMBER, "true slant range then, m")
+    line = Line((5.0, "x"), result, estimate, 2, 1250.0, runs=14, cut_off=(("never", 2),))
+    cells = _line(line, exact) if exact else _line(line)
+    assert cells == ("5", "x", *said, 12, 2, "few", "2 of 14 never", "1250")
