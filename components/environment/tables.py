@@ -3,7 +3,7 @@
 They are ``[weather]``, ``[accuracy]``, ``[navigation]`` and ``[terrain]``.
 """
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -14,6 +14,11 @@ from dsa_des.time.gauss_markov import LONGEST_S
 
 class Weather(Parameters):
     """The weather; by default there is none, and sensors look through empty space."""
+
+    may_change: ClassVar[tuple[str, ...]] = (
+        "gas", "vapour_density_g_m3", "rain_rate_mm_h", "rain_top_m", "fog_water_g_m3",
+        "fog_base_m", "fog_top_m", "fog_temperature_c", "visibility_km", "night",
+    )  # fmt: skip
 
     gas: bool = Field(
         default=False, description="Whether oxygen and water vapour attenuate radar (P.676)."

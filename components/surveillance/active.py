@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
@@ -80,6 +80,8 @@ _TOLD_ERRORS = (
 
 class ActiveParameters(CooperativeParameters):
     """Parameters of active surveillance."""
+
+    may_change: ClassVar[tuple[str, ...]] = ("mode_s_in_1_s", "mode_c_in_1_s")
 
     elevation_deg: Annotated[tuple[float, float], AfterValidator(rising_elevations)] = Field(
         default=(-15.0, 20.0), description="Elevations at which answers come, deg."

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -62,6 +62,8 @@ LONGEST_S = 5.0
 
 class AdsBParameters(CooperativeParameters):
     """Parameters of a receiver of ADS-B."""
+
+    may_change: ClassVar[tuple[str, ...]] = ("aircraft_around", "airports_around")
 
     reception: Literal["certain", "do_365", "fitted"] = Field(
         default="fitted",

@@ -332,6 +332,8 @@ def _refusals(scene: Scene, source: str) -> list[Problem]:
     looped = in_cycles(scene.graph)
     if looped:
         refusals.append(("wires", f"feedback between {', '.join(sorted(looped))}"))
+    if scene.changes:
+        refusals.append(("changes", "something that changes while it runs"))
     for wire in scene.wires:
         if wire.delayed or wire.jitter_s or wire.drop_probability:
             refusals.append(("wires", f"{wire} has a delay, jitter, latency or loss"))

@@ -31,6 +31,7 @@ from dsa_des.running.channel import Channel, Inputs
 from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
 from dsa_des.running.processors import Processor
 from dsa_des.running.windows import Window
+from dsa_des.stretches.stretched_block import StretchedBlock
 from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.run_clock import RunClock
 
@@ -89,6 +90,8 @@ class Node:
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
     #: What handles the wakes: the block itself, or its instances, one per replica.
     runner: Any = None
+    #: Its instances in each stretch of time, where it changes while it runs.
+    stretched: StretchedBlock | None = None
     #: Whether it may run ahead of the window (`Window.ahead`).
     ahead: bool = False
 
@@ -107,6 +110,18 @@ class Node:
     @cached_property
     def _trigger_wires(self) -> list[Channel]:
         return [wire for port in self._trigger_ports for wire in self.channels.get(port, ())]
+
+    @property
+    def last(self) -> Component:
+        """The block as it is now, with what it remembers."""
+        return self.component if self.stretched is None else self.stretched.now
+
+    @property
+    def things(self) -> list[object]:
+        """All whose attributes hold its state."""
+        if self.stretched is not None:
+            return self.stretched.things
+        return [self.component, *self.component.context.effects.values()]
 
     @property
     def wires(self) -> list[Channel]:
@@ -302,7 +317,11 @@ class Node:
             self._ran[wake.run] = True
             self._all_ran = bool(self._ran.all())
         try:
-            self.send(self.runner.run(wake), wake.instants)
+            if self.stretched is None:
+                self.send(self.runner.run(wake), wake.instants)
+            else:
+                for runner, part in self.stretched.parts(wake):
+                    self.send(runner.run(part), part.instants)
         except (Abort, RunRefused):
             raise
         except BaseException as error:

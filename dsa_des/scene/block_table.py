@@ -7,7 +7,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import Field, field_validator
 
@@ -17,6 +17,8 @@ from dsa_des.scene.queue_policy import find_policy
 
 class BlockOptions(Parameters):
     """Keys of a block's table that belong to the engine."""
+
+    may_change: ClassVar[tuple[str, ...]] = ("latency_s",)
 
     latency_s: NonNegativeRational = Field(
         default=Fraction(0), description="Time from an instant to the messages about it, s."
@@ -43,6 +45,8 @@ def split_options(
 
 class ProcessorParameters(Parameters):
     """A table ``[processors.NAME]``."""
+
+    may_change: ClassVar[tuple[str, ...]] = ("service_s", "service_spread_s")
 
     service_s: PositiveRational = Field(description="Time to work on one message, s.")
     service_spread_s: NonNegativeRational = Field(

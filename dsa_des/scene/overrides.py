@@ -107,7 +107,7 @@ def apply_changes(
             name = key.removeprefix(SWAP)
             dropped += swap_type(scene, name, value, swap_source, option)
         else:
-            scene.problems += _set_value(scene, key, deepcopy(value), source)
+            scene.problems += set_value(scene, key, deepcopy(value), source)
     return dropped
 
 
@@ -116,10 +116,10 @@ def apply_sets(scene: SceneFile, assignments: Iterable[str]) -> None:
     values, problems = read_sets(assignments)
     scene.problems += problems
     for text, value in values:
-        scene.problems += _set_value(scene, text, value, COMMAND_LINE)
+        scene.problems += set_value(scene, text, value, COMMAND_LINE)
 
 
-def _set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:
+def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:
     """Put a value at a dotted key of the scene's tables and return what is wrong with that.
 
     Items of lists go by number or name: ``blocks.traffic.intruders[0].east_m``, or
