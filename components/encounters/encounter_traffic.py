@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 
 from components.encounters.made_encounters import read_made
 from components.encounters.model_file import read_model
-from components.encounters.pair_densities import PairingRules, pairing_rules
+from components.encounters.pair_densities import MissDistances, PairingRules, pairing_rules
 from components.encounters.pairing import PairSampler, set_of_pairs
 from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.sampled_flight import SampledTrajectory
@@ -27,7 +27,7 @@ from components.geometry import enu_to_geodetic, line_of_sight
 from components.traffic.recorded import FileParameters, RecordedTraffic
 from components.traffic.scripted import Ownship, flight_of
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.component import Parameters, ScenePath
+from dsa_des.block.component import ScenePath
 from dsa_des.block.ladder import Verified
 
 #: An encounter: its set, and its index there.
@@ -160,21 +160,6 @@ class SetParameters(OneEncounter):
         default=False,
         description="Use the set without its damaged encounters; otherwise any is an error.",
     )
-
-
-class MissDistances(Parameters):
-    """How often encounters of a model pass at which distance; their weights undo it."""
-
-    edges_ft: tuple[float, ...] = Field(description="Rising edges of steps, ft.")
-    proportions: tuple[float, ...] = Field(
-        description="Of each step between two edges: of horizontal distances the share of "
-        "encounters in it, of vertical ones the chance (at most 1) with which they are accepted."
-    )
-
-    @property
-    def steps(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Edges and proportions."""
-        return self.edges_ft, self.proportions
 
 
 class ModelParameters(OneEncounter):

@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from dsa_des.arrays.types import FloatArray
+from dsa_des.block.component import Parameters
 
 _NAUTICAL_MILE_FT = 6076.115485564304
 
@@ -120,6 +122,21 @@ class PairingRules:
                 f"closest_s = {self.closest_s}: must lie between 0 and duration_s = "
                 f"{self.duration_s}"
             )
+
+
+class MissDistances(Parameters):
+    """How often encounters of a model pass at which distance; their weights undo it."""
+
+    edges_ft: tuple[float, ...] = Field(description="Rising edges of steps, ft.")
+    proportions: tuple[float, ...] = Field(
+        description="Of each step between two edges: of horizontal distances the share of "
+        "encounters in it, of vertical ones the chance (at most 1) with which they are accepted."
+    )
+
+    @property
+    def steps(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Edges and proportions."""
+        return self.edges_ft, self.proportions
 
 
 def pairing_rules(*steps: Sequence[Sequence[float]] | None) -> PairingRules:

@@ -5,20 +5,19 @@ ownship was told (`components.metrics.risk`); beside them stand the encounter's 
 class of its geometry. The ratios themselves are taken over all runs of a cell.
 """
 
-import math
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal, NamedTuple
+from collections.abc import Mapping
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from components.encounters.encounter_traffic import Encounter, ModelTraffic, SetTraffic
 from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class, pair_paths
-from components.metrics.losses import FlightsTogether, nearest_of, ways_of
+from components.metrics.losses import meeting_deg, nominal_geometry
 from components.metrics.risk import Mitigated, RiskParameters
-from components.metrics.separation import RelativeFlight, traffic_block
+from components.metrics.separation import traffic_block
 from components.well_clear.plane_pairs import Meetings, meetings
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.scene.block_table import Block
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import (
@@ -98,10 +97,6 @@ _TURNED_M, _CLIMBED_M, _SLACK = 250.0, 100.0, 0.15
 _LEAST_SIZES = 0.01
 # No sector of courses or bearings is so narrow, degrees.
 _WIDE_DEG = 35.0
-# How far apart distances are looked at to choose runs by.
-_COARSE_S = 1.0
-# Courses are taken over this time to both sides of the closest approach.
-_BASE_S = 0.5
 
 
 class RiskRatioParameters(RiskParameters):
@@ -313,22 +308,6 @@ def side_of(bearing_deg: FloatArray) -> AnyArray:
     return result
 
 
-def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return course and bearing (2, runs) of the nearest intruder at the closest approach, degrees.
-
-    Course: the intruder's less the ownship's. Bearing from where the intruder closes in, clockwise
-    from the ownship's course: opposite to its velocity relative to the ownship. NaN where they
-    never meet.
-    """
-    flights = [flight for run in runs for flight in run]
-    nearest = _nearest_of_each(runs, *nearest_of(flights))
-    angles = np.full((2, len(runs)), np.nan)
-    angles[:, nearest.runs] = _angles_deg(
-        *ways_of([flights[k] for k in nearest.flights], nearest.time_s, _BASE_S)
-    )
-    return angles
-
-
 def met_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
     """Return how runs meet as far as the plane tells; None where it cannot tell of any."""
     block, scene = traffic_block(group.scene), group.scene
@@ -344,71 +323,3 @@ def met_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
         return None
     paths, end_s = pair_paths(encounters_of(group), one.dynamics), float(scene.duration_s or "inf")
     return meetings(paths, len(group), end_s, p.sizes_m)
-
-
-def nominal_geometry(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return about how the nearest intruder of each run is met, (6, runs); NaN where none is.
-
-    Time (s), horizontal and vertical distance (m) and relative speed in the level plane (m/s) at
-    the closest approach, then course and bearing (`meeting_deg`), degrees. Distances are looked at
-    every `_COARSE_S`: enough to choose runs by.
-    """
-    flights = [flight for run in runs for flight in run]
-    result = np.full((6, len(runs)), np.nan)
-    if not flights:
-        return result
-    together = FlightsTogether(flights)
-    many = 1 + int(max(flight.end_s for flight in flights) / _COARSE_S)
-    times_s, every = _COARSE_S * np.arange(many), np.arange(len(flights))
-    level_m, up_m = (
-        part.reshape(len(flights), many)
-        for part in together.level_distances_m(
-            np.repeat(every, many), np.tile(times_s, len(flights))
-        )
-    )
-    range_m = np.hypot(level_m, up_m)
-    index = np.argmin(range_m, axis=1)
-    nearest = _nearest_of_each(runs, range_m[every, index], times_s[index])
-    some, time_s = nearest.flights, nearest.time_s
-    own_m, other_m = ways_of([flights[k] for k in some], time_s, _BASE_S)
-    speed_mps = np.hypot(*(other_m - own_m)) / (2.0 * _BASE_S)
-    result[0, nearest.runs] = time_s
-    result[1, nearest.runs] = level_m[some, index[some]]
-    result[2, nearest.runs] = up_m[some, index[some]]
-    result[3, nearest.runs] = speed_mps
-    result[4:, nearest.runs] = _angles_deg(own_m, other_m)
-    return result
-
-
-class _Nearest(NamedTuple):
-    """Runs in which somebody is met, and of each whose flight is nearest, and when."""
-
-    runs: list[int]
-    flights: IntArray
-    time_s: FloatArray
-
-
-def _nearest_of_each(
-    runs: Sequence[list[RelativeFlight]], distance_m: FloatArray, time_s: FloatArray
-) -> _Nearest:
-    met: list[int] = []
-    nearest: list[int] = []
-    start = 0
-    for number, run in enumerate(runs):
-        index = start + int(np.argmin(distance_m[start : start + len(run)])) if run else start
-        if run and np.isfinite(distance_m[index]):
-            met.append(number)
-            nearest.append(index)
-        start += len(run)
-    chosen = np.array(nearest, dtype=np.int64)
-    return _Nearest(met, chosen, time_s[chosen])
-
-
-def _angles_deg(own_m: FloatArray, other_m: FloatArray) -> FloatArray:
-    """Return course and bearing (2, flights) of intruders, by how both move, degrees."""
-    angles = np.empty((2, own_m.shape[1]))
-    for number, (own, other) in enumerate(zip(own_m.T.tolist(), other_m.T.tolist(), strict=True)):
-        course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]
-        closing = math.degrees(math.atan2(own[1] - other[1], own[0] - other[0]))
-        angles[:, number] = (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0
-    return angles

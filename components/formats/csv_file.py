@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from datetime import UTC, datetime
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain
 from os import PathLike
 from pathlib import Path
@@ -22,16 +21,17 @@ from components.formats.sample_columns import (
     SampleColumn,
     complete_velocity,
     enu_velocity,
+    in_epoch_units,
     indices_of,
     is_missing,
+    name_and_unit,
+    time_parser,
     unit_factor,
 )
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import (
-    ALL_TOKENS,
     Problems,
     TrafficFile,
-    clean_token,
     did_you_mean,
     each_line,
     read_content,
@@ -90,8 +90,6 @@ _FAMILIES = (
 #: Fewer different ones may be in steps of 25 by chance.
 _FEW_HEIGHTS = 5
 _OF_FAMILIES = {"alt": "ft", "alt instead": "ft", "gs": "kt", "vs": "ft/min"}
-#: A clock that counts from 1970 is beyond these numbers in ns, µs and ms, and in s never.
-_EPOCHS = ((1e17, "ns"), (1e14, "µs"), (1e11, "ms"))
 
 
 def read_csv(
@@ -154,7 +152,7 @@ def record_rows(
     """Return the aircraft of rows of cells, each with its line, see `record_table`."""
     at, position = len(headers), _single_position(headers)
     is_nameless = stem is not None and _KNOWN_NAMES.isdisjoint(
-        _name_and_unit(header)[0] for header in headers
+        name_and_unit(header)[0] for header in headers
     )
     if is_nameless:
         headers.append("id")
@@ -162,15 +160,15 @@ def record_rows(
         headers[position : position + 1] = ["lat", "lon"]
     columns, notes = _find_columns(problems, headers, header_line, altitude)
     identity, time = columns.pop("id").index, columns["time"].index
-    plain = [_name_and_unit(header)[0] for header in headers]
+    plain = [name_and_unit(header)[0] for header in headers]
     date = next((plain.index(name) for name in _DATES if name in plain), None)
     # Where a position's own time is not known, that of its row must do.
     other = next((plain.index(name) for name in _CLOCKS if name in plain), time)
     ahead = _until_a_time(rows, time, other)
     if ahead and (begins := _time_cell(ahead[-1][1], time, other)):
-        columns["time"] = _epoch(columns["time"], begins, headers[time], notes)
+        columns["time"] = in_epoch_units(columns["time"], begins, headers[time], notes)
     table = SampleTable(
-        problems, headers, identity, columns, _time_parser(columns["time"]),
+        problems, headers, identity, columns, time_parser(columns["time"]),
         columns.keys() - _NEEDED, gaps=True, shared=plain[identity] not in _ADDRESSES,
         instead={"alt": "alt instead"} if "alt instead" in columns else {},
         least=2 if stem is None else 1, repeats=plain[time] in _OF_POSITIONS,
@@ -239,7 +237,7 @@ _KNOWN = {name for spec in COLUMNS.values() for name in spec.names}
 
 def known_among(headers: Iterable[str]) -> int:
     """Return how many names of columns are of those that a table may have."""
-    return len({_name_and_unit(header)[0] for header in headers} & _KNOWN)
+    return len({name_and_unit(header)[0] for header in headers} & _KNOWN)
 
 
 def _header_and_rows(
@@ -252,7 +250,7 @@ def _header_and_rows(
 
     def count(text: str) -> int:
         words = re.split(r"[,;|\t]+", text.lstrip("# "))
-        return sum(_name_and_unit(word)[0] in _KNOWN for word in words)
+        return sum(name_and_unit(word)[0] in _KNOWN for word in words)
 
     comment: tuple[int, str] | None = None
     for one in lines:
@@ -295,7 +293,7 @@ def _rows(lines: Iterator[tuple[int, str]], delimiter: str) -> Iterator[tuple[in
 
 def _single_position(headers: list[str]) -> int | None:
     """Return the column that holds latitude and longitude, where none holds one of them alone."""
-    plain = [_name_and_unit(header)[0] for header in headers]
+    plain = [name_and_unit(header)[0] for header in headers]
     if any(name in plain for name in COLUMNS["lat"].names):
         return None
     return next((plain.index(name) for name in _POSITIONS if name in plain), None)
@@ -305,7 +303,7 @@ def _find_columns(
     problems: Problems, headers: list[str], line: int, altitude: Altitude | None
 ) -> tuple[dict[str, SampleColumn], list[str]]:
     """Match the headers, with notes on them; a missing required column ends the reading."""
-    parsed = [_name_and_unit(header) for header in headers]
+    parsed = [name_and_unit(header) for header in headers]
     names = [name for name, _ in parsed]
     specs = _specs(names, altitude)
     columns: dict[str, SampleColumn] = {}
@@ -352,49 +350,6 @@ def _specs(names: list[str], altitude: Altitude | None) -> Mapping[str, ColumnSp
     if altitude is None and len(there) > 1:
         specs["alt instead"] = ColumnSpec(tuple(there[1:]), "m")
     return specs
-
-
-def _name_and_unit(header: str) -> tuple[str, str | None]:
-    """Split 'Altitude (ft)', 'alt_ft' or 'alt [ft]' into a plain name and a unit."""
-    unit = None
-    match = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", header)
-    if match:
-        header, unit = match[1], match[2]
-    else:
-        base, _, suffix = header.rpartition("_")
-        if base and clean_token(suffix) in ALL_TOKENS:
-            header, unit = base, suffix
-    return re.sub(r"[\s_\-.]", "", header).lower(), unit
-
-
-def _epoch(column: SampleColumn, cell: str, header: str, notes: list[str]) -> SampleColumn:
-    """Return the column of time in the unit that its first number must be in."""
-    if _name_and_unit(header)[1] is not None or not re.fullmatch(r"\d{12,19}(\.\d*)?", cell):
-        return column
-    unit = next(unit for least, unit in _EPOCHS if float(cell) >= least)
-    notes.append(f"{header} is taken in {unit}: its numbers are too large for seconds")
-    return SampleColumn(column.index, column.header, COLUMNS["time"].units[unit])
-
-
-def _time_parser(column: SampleColumn) -> Callable[[str], float]:
-    """Make a function that reads a number in the column's unit, an ISO 8601 instant or a clock."""
-
-    def parse(cell: str) -> float:
-        try:
-            if "_" in cell:
-                raise ValueError(cell)
-            return float(cell) * column.factor
-        except ValueError:
-            if clock := re.fullmatch(r"(\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)Z?", cell):
-                return 3600.0 * int(clock[1]) + 60.0 * int(clock[2]) + float(clock[3])
-            if "-" not in cell[1:] and "/" not in cell:
-                raise
-            instant = datetime.fromisoformat(cell.replace("/", "-").removesuffix(" UTC"))
-            if instant.tzinfo is None:
-                instant = instant.replace(tzinfo=UTC)
-            return instant.timestamp()
-
-    return parse
 
 
 def csv_columns() -> list[tuple[str, ...]]:

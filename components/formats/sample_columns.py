@@ -1,14 +1,23 @@
-"""Columns of a table of samples: the names they go by, their units, and cells that say nothing."""
+"""Columns of a table of samples: names, units, clocks, and cells that say nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Literal
 
 import numpy as np
 
-from components.formats.text_rows import MOST_OF_A_CELL, NO_UNIT, UNIT_KINDS, Problems, clean_token
+from components.formats.text_rows import (
+    ALL_TOKENS,
+    MOST_OF_A_CELL,
+    NO_UNIT,
+    UNIT_KINDS,
+    Problems,
+    clean_token,
+)
 from dsa_des.arrays.types import FloatArray
 from dsa_des.text.safe_text import shortened
 
@@ -91,3 +100,50 @@ def enu_velocity(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
             "vu": columns["vs"],
         }
     return {}
+
+
+#: A clock that counts from 1970 is beyond these numbers in ns, µs and ms, and in s never.
+_EPOCHS = ((1e17, "ns"), (1e14, "µs"), (1e11, "ms"))
+
+
+def name_and_unit(header: str) -> tuple[str, str | None]:
+    """Split 'Altitude (ft)', 'alt_ft' or 'alt [ft]' into a plain name and a unit."""
+    unit = None
+    match = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", header)
+    if match:
+        header, unit = match[1], match[2]
+    else:
+        base, _, suffix = header.rpartition("_")
+        if base and clean_token(suffix) in ALL_TOKENS:
+            header, unit = base, suffix
+    return re.sub(r"[\s_\-.]", "", header).lower(), unit
+
+
+def in_epoch_units(column: SampleColumn, cell: str, header: str, notes: list[str]) -> SampleColumn:
+    """Return the column of time in the unit that its first number must be in."""
+    if name_and_unit(header)[1] is not None or not re.fullmatch(r"\d{12,19}(\.\d*)?", cell):
+        return column
+    unit = next(unit for least, unit in _EPOCHS if float(cell) >= least)
+    notes.append(f"{header} is taken in {unit}: its numbers are too large for seconds")
+    return SampleColumn(column.index, column.header, ColumnSpec((), "s").units[unit])
+
+
+def time_parser(column: SampleColumn) -> Callable[[str], float]:
+    """Make a function that reads a number in the column's unit, an ISO 8601 instant or a clock."""
+
+    def parse(cell: str) -> float:
+        try:
+            if "_" in cell:
+                raise ValueError(cell)
+            return float(cell) * column.factor
+        except ValueError:
+            if clock := re.fullmatch(r"(\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)Z?", cell):
+                return 3600.0 * int(clock[1]) + 60.0 * int(clock[2]) + float(clock[3])
+            if "-" not in cell[1:] and "/" not in cell:
+                raise
+            instant = datetime.fromisoformat(cell.replace("/", "-").removesuffix(" UTC"))
+            if instant.tzinfo is None:
+                instant = instant.replace(tzinfo=UTC)
+            return instant.timestamp()
+
+    return parse

@@ -1,11 +1,12 @@
-"""First losses of separation and closest approaches, flight by flight and of many together.
+"""First losses of separation and closest approaches, and how somebody is met there.
 
 Results of many flights are those flight by flight, to the bit.
 """
 
+import math
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -263,3 +264,93 @@ def ways_of(
         )
         result.append(np.array([north1 - north0, east1 - east0]))
     return result[0], result[1]
+
+
+# How far apart distances are looked at to choose runs by.
+_COARSE_S = 1.0
+# Courses are taken over this time to both sides of the closest approach.
+_BASE_S = 0.5
+
+
+def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+    """Return course and bearing (2, runs) of the nearest intruder at the closest approach, degrees.
+
+    Course: the intruder's less the ownship's. Bearing from where the intruder closes in, clockwise
+    from the ownship's course: opposite to its velocity relative to the ownship. NaN where they
+    never meet.
+    """
+    flights = [flight for run in runs for flight in run]
+    nearest = _nearest_of_each(runs, *nearest_of(flights))
+    angles = np.full((2, len(runs)), np.nan)
+    angles[:, nearest.runs] = _angles_deg(
+        *ways_of([flights[k] for k in nearest.flights], nearest.time_s, _BASE_S)
+    )
+    return angles
+
+
+def nominal_geometry(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+    """Return about how the nearest intruder of each run is met, (6, runs); NaN where none is.
+
+    Time (s), horizontal and vertical distance (m) and relative speed in the level plane (m/s) at
+    the closest approach, then course and bearing (`meeting_deg`), degrees. Distances are looked at
+    every `_COARSE_S`: enough to choose runs by.
+    """
+    flights = [flight for run in runs for flight in run]
+    result = np.full((6, len(runs)), np.nan)
+    if not flights:
+        return result
+    together = FlightsTogether(flights)
+    many = 1 + int(max(flight.end_s for flight in flights) / _COARSE_S)
+    times_s, every = _COARSE_S * np.arange(many), np.arange(len(flights))
+    level_m, up_m = (
+        part.reshape(len(flights), many)
+        for part in together.level_distances_m(
+            np.repeat(every, many), np.tile(times_s, len(flights))
+        )
+    )
+    range_m = np.hypot(level_m, up_m)
+    index = np.argmin(range_m, axis=1)
+    nearest = _nearest_of_each(runs, range_m[every, index], times_s[index])
+    some, time_s = nearest.flights, nearest.time_s
+    own_m, other_m = ways_of([flights[k] for k in some], time_s, _BASE_S)
+    speed_mps = np.hypot(*(other_m - own_m)) / (2.0 * _BASE_S)
+    result[0, nearest.runs] = time_s
+    result[1, nearest.runs] = level_m[some, index[some]]
+    result[2, nearest.runs] = up_m[some, index[some]]
+    result[3, nearest.runs] = speed_mps
+    result[4:, nearest.runs] = _angles_deg(own_m, other_m)
+    return result
+
+
+class _Nearest(NamedTuple):
+    """Runs in which somebody is met, and of each whose flight is nearest, and when."""
+
+    runs: list[int]
+    flights: IntArray
+    time_s: FloatArray
+
+
+def _nearest_of_each(
+    runs: Sequence[list[RelativeFlight]], distance_m: FloatArray, time_s: FloatArray
+) -> _Nearest:
+    met: list[int] = []
+    nearest: list[int] = []
+    start = 0
+    for number, run in enumerate(runs):
+        index = start + int(np.argmin(distance_m[start : start + len(run)])) if run else start
+        if run and np.isfinite(distance_m[index]):
+            met.append(number)
+            nearest.append(index)
+        start += len(run)
+    chosen = np.array(nearest, dtype=np.int64)
+    return _Nearest(met, chosen, time_s[chosen])
+
+
+def _angles_deg(own_m: FloatArray, other_m: FloatArray) -> FloatArray:
+    """Return course and bearing (2, flights) of intruders, by how both move, degrees."""
+    angles = np.empty((2, own_m.shape[1]))
+    for number, (own, other) in enumerate(zip(own_m.T.tolist(), other_m.T.tolist(), strict=True)):
+        course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]
+        closing = math.degrees(math.atan2(own[1] - other[1], own[0] - other[0]))
+        angles[:, number] = (course[1] - course[0]) % 360.0, (closing - course[0]) % 360.0
+    return angles

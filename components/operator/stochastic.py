@@ -1,9 +1,4 @@
-"""A pilot as a random process (``operator.stochastic``): delays and steering of a published model.
-
-Numbers are those of release 6 of MIT Lincoln Laboratory's pilot model of its encounter simulation
-(DEGAS), of which R. Guendel, M. Kuffner and D. Maki, "A model of unmanned aircraft pilot detect and
-avoid maneuver decisions", MIT Lincoln Laboratory, ATC-434, 2017, tells how they were measured.
-"""
+"""A pilot as a random process (``operator.stochastic``), by the published `pilot_model`."""
 
 import math
 from collections.abc import Sequence
@@ -12,113 +7,17 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.arguments.units import FOOT_M
 from components.flights.point_mass import LEAST_EASING_S
 from components.guidance.daidalus import ConfParameters, changes_out, why_never_steers
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
+from components.operator.pilot_model import Draws, mean_pause_s, pause_s, response_s, steering
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
 from dsa_des.record.undone import NO_COUNTS, with_cases
 from dsa_des.time.clock import nanosecond_of
-
-#: Shape of the time that coordination with air traffic control takes, a gamma distribution.
-COORDINATION_SHAPE = 5.5
-#: With two ways out that differ by more, rad, the smaller change is always taken.
-CLEARLY_SMALLER_RAD = math.radians(40.0)
-#: Otherwise it is taken with this probability, and where not: left, and down, with these.
-FOLLOWS_SMALLER, LEFT, DESCENDS = 0.8, 0.6, 0.5
-_DEGREE = math.pi / 180.0
-
-
-class Excess(NamedTuple):
-    """How far beyond the least change a pilot steers: a gamma distribution, shifted."""
-
-    shape: float
-    scale: float  # What is drawn is multiplied by the one, and lessened by the other
-    less: float
-    fixed: float  # Of the deterministic pilot
-
-
-TURN = Excess(6.21, 9.67 * _DEGREE, 30.0 * _DEGREE, 30.0 * _DEGREE)
-TURN_OTHER_SIDE = Excess(5.47, 8.25 * _DEGREE, 30.0 * _DEGREE, 15.0 * _DEGREE)
-CLIMB = Excess(9.73, 207.98 * FOOT_M, 1500.0 * FOOT_M, 500.0 * FOOT_M)
-
-# Least time to the next decision and the mean of what comes on top, s: without an alert, then by
-# level 1 (preventive), 2 (corrective), 3 (warning).
-_PAUSES = ((12.0, 12.0), (9.0, 6.0), (6.0, 3.0), (6.0, 3.0))
-
-
-def exponential(uniform: float, mean: float) -> float:
-    """Return a draw of the exponential distribution from one in [0, 1)."""
-    return -mean * math.log1p(-uniform)
-
-
-def gamma(uniform: float, shape: float, scale: float) -> float:
-    """Return a draw of the gamma distribution from one in [0, 1)."""
-    from scipy.special import gammaincinv  # only who draws pays for its import
-
-    return float(scale * gammaincinv(shape, uniform))
-
-
-def pause_s(level: int, uniform: float) -> float:
-    """Return how long a pilot waits before deciding again."""
-    least, mean = _PAUSES[min(max(level, 0), len(_PAUSES) - 1)]
-    return least + exponential(uniform, mean)
-
-
-def mean_pause_s(level: int) -> float:
-    """Return the mean of `pause_s`."""
-    least, mean = _PAUSES[min(max(level, 0), len(_PAUSES) - 1)]
-    return least + mean
-
-
-class Draws(NamedTuple):
-    """What is drawn for one steering decision, each in [0, 1)."""
-
-    follows: float
-    side: float
-    size: float
-
-
-def steering(
-    changes: tuple[float, float], turns: bool, draws: Draws | None, goes_beyond: bool = True
-) -> float:
-    """Return the change that a pilot makes, of the sign of its side."""
-    low, high = changes
-    if math.isinf(low) and math.isinf(high):
-        return 0.0
-    smaller_is_high = high <= -low
-    to_high = smaller_is_high
-    if draws is not None and math.isfinite(low) and math.isfinite(high):
-        clear = turns and abs(high + low) > CLEARLY_SMALLER_RAD
-        if not clear and draws.follows >= FOLLOWS_SMALLER:
-            to_high = draws.side >= (LEFT if turns else DESCENDS)
-    excess = CLIMB
-    if turns:
-        excess = TURN if to_high == smaller_is_high else TURN_OTHER_SIDE
-    beyond = excess.fixed if goes_beyond else 0.0
-    if draws is not None and goes_beyond:
-        beyond = gamma(draws.size, excess.shape, excess.scale) - excess.less
-    size = max((high if to_high else -low) + beyond, 0.0)
-    if turns:
-        size = min(size, math.pi)
-    return size if to_high else -size
-
-
-def response_s(
-    uniforms: FloatArray | None, initial_s: float, coordination_s: float, execution_s: float
-) -> tuple[float, float]:
-    """Return how long a pilot takes to react and coordinate, and then to begin the manoeuvre."""
-    if uniforms is None:
-        return initial_s + coordination_s, execution_s
-    first, second, third = np.asarray(uniforms, dtype=np.float64).tolist()
-    waits_s = exponential(first, initial_s)
-    if coordination_s > 0.0:
-        waits_s += gamma(second, COORDINATION_SHAPE, coordination_s / COORDINATION_SHAPE)
-    return waits_s, exponential(third, execution_s)
 
 
 class StochasticParameters(ConfParameters):

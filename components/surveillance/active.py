@@ -10,13 +10,11 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from components.arguments.units import FOOT_M
-from components.estimation.carried_errors import BEARING, RANGE
 from components.geometry import wrap_pi_unchecked
 from components.messages.detections import (
     LastingError,
     LastingPart,
     SensorOffer,
-    ToldError,
     promises_of_looks,
 )
 from components.messages.reach import EVALUATE, Reach
@@ -30,7 +28,7 @@ from components.surveillance.broadcast import Altimeters, Transponders
 from components.surveillance.cooperative import (
     CooperativeParameters,
     CooperativeSensor,
-    velocity_of,
+    own_velocity,
 )
 from components.surveillance.extended_squitter import altitude_step_ft
 from components.surveillance.interrogation import (
@@ -51,8 +49,7 @@ from components.surveillance.interrogation import (
 )
 from components.surveillance.reports import unreported
 from components.surveillance.stated_errors import (
-    ALTIMETER,
-    ROUNDING,
+    ERRORS_OF_REPLIES,
     unstated_errors,
     variances_of_replies,
 )
@@ -67,15 +64,6 @@ _FARTHEST_M = max(MODE_S_REACH_M, *MODE_C_REACH_M)
 _LEAST_M2 = 1e-4
 #: So much of all else is taken to be new in every answer.
 _WHITE_M2 = 0.25
-
-
-_TOLD_ERRORS = (
-    ALTIMETER,
-    ROUNDING,
-    ToldError(BEARING, "bearing_deviation", 0.0, of_aircraft=False),
-    ToldError(RANGE, "delay_deviation", math.inf),
-    ToldError(RANGE, "range_deviation", RANGE_CORRELATION_S, of_aircraft=False),
-)
 
 
 class ActiveParameters(CooperativeParameters):
@@ -211,7 +199,7 @@ class Active(CooperativeSensor):
             promises=promises_of_looks(
                 period_s, [(math.inf, every * period_s)] if every > 1 else ()
             ),
-            tells=self._errs, told_errors=_TOLD_ERRORS if self._errs else (),
+            tells=self._errs, told_errors=ERRORS_OF_REPLIES if self._errs else (),
         )  # fmt: skip
 
     def answer_probability(self, cells: Cells) -> FloatArray:
@@ -383,7 +371,7 @@ class Active(CooperativeSensor):
         none = np.zeros(len(detected))
         mode_s = cells.roster.equipage.mode_s[cells.craft[detected]]
         position_m, attitude_rad = navigation_noise(self.context)
-        own = velocity_of(cells, detected, none, cells.seen_at(detected, none), "own")
+        own = own_velocity(cells, detected)
         altimetry_ft2 = altimetry_variance_ft2(altitude_m / FOOT_M)
         step_ft = self._step_ft(cells, detected, altitude_m)
         return unstated_errors(len(detected)) | {

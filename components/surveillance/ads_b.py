@@ -34,6 +34,7 @@ from components.surveillance.cooperative import (
     STEP_S,
     CooperativeParameters,
     CooperativeSensor,
+    own_velocity,
     velocity_of,
 )
 from components.surveillance.reception import (
@@ -233,7 +234,7 @@ class AdsB(CooperativeSensor):
     def look(self, cells: Cells) -> Look:
         """Receive what was sent up to each scan, and decode the last of it."""
         extras = unreported(len(cells))
-        own_velocity = np.full((3, len(cells)), np.nan)
+        moves = np.full((3, len(cells)), np.nan)
         equipage = cells.roster.equipage
         sends = np.flatnonzero(equipage.ads_b[cells.craft])
         reported, number, sent_ns = self._last_received("position", cells, sends)
@@ -244,11 +245,11 @@ class AdsB(CooperativeSensor):
             # An altitude that no code has is not available, and there is no place without one.
             placed = np.isfinite(extras["reported_alt_m"][reported])
             detected[reported], reported = placed, reported[placed]
-            own_velocity[:, reported] = self._own_velocity(cells, reported)
-        moves = {f"own_{axis}": own_velocity[i] for i, axis in enumerate(("north", "east", "down"))}
-        self._rows = cells.row, own_velocity
+            moves[:, reported] = own_velocity(cells, reported)
+        signal = {f"own_{axis}": moves[i] for i, axis in enumerate(("north", "east", "down"))}
+        self._rows = cells.row, moves
         confidence = np.where(detected, equipage.nacp[cells.craft], 0.0)
-        return Look(detected, confidence, extras, signal=moves)
+        return Look(detected, confidence, extras, signal=signal)
 
     def _last_received(
         self, kind: str, cells: Cells, asked: IntArray
@@ -339,10 +340,6 @@ class AdsB(CooperativeSensor):
         velocity[2] = -velocity[2]
         lat, lon, alt = position
         return Sent(lat, lon, alt, velocity, number, instant_ns)
-
-    def _own_velocity(self, cells: Cells, detected: IntArray) -> FloatArray:
-        now = np.zeros(len(detected))
-        return velocity_of(cells, detected, now, cells.seen_at(detected, now), "own")
 
     def _measured(
         self,

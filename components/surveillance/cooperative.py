@@ -87,6 +87,12 @@ class CooperativeSensor(Sensor):
         return self.reach
 
 
+def own_velocity(cells: Cells, which: IntArray) -> FloatArray:
+    """Return the ownship's velocity at some cells, north, east and down (3, n)."""
+    now = np.zeros(len(which))
+    return velocity_of(cells, which, now, cells.seen_at(which, now), "own")
+
+
 def velocity_of(
     cells: Cells, which: IntArray, ahead_s: FloatArray, here: Any, whose: str
 ) -> FloatArray:

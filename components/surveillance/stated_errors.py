@@ -10,11 +10,13 @@ import numpy as np
 from components.aircraft.equipage import Equipage
 from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
 from components.estimation.carried_errors import (
+    BEARING,
     CLIMB,
     EAST,
     HEIGHT,
     LATENCY,
     NORTH,
+    RANGE,
     SPEED_EAST,
     SPEED_NORTH,
 )
@@ -27,7 +29,7 @@ from components.surveillance.extended_squitter import (
     altitude_step_ft,
     speed_step_kt,
 )
-from components.surveillance.interrogation import RANGE_BIAS_M, RANGE_ERROR_M
+from components.surveillance.interrogation import RANGE_BIAS_M, RANGE_CORRELATION_S, RANGE_ERROR_M
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 #: Mean square error of a compact position in each axis: 360/60 degrees in 2^17 parts.
@@ -63,6 +65,14 @@ VERTICAL_RATE = ToldError(CLIMB, "climb_deviation", 0.0, of_aircraft=False)
 
 #: By how long all positions of an aircraft are late: what of its latency it does not compensate.
 LATE = ToldError(LATENCY, "latency_deviation", math.inf)
+#: Of what answers to interrogations tell.
+ERRORS_OF_REPLIES = (
+    ALTIMETER,
+    ROUNDING,
+    ToldError(BEARING, "bearing_deviation", 0.0, of_aircraft=False),
+    ToldError(RANGE, "delay_deviation", math.inf),
+    ToldError(RANGE, "range_deviation", RANGE_CORRELATION_S, of_aircraft=False),
+)
 
 
 def told_errors(position_errors: str) -> tuple[ToldError, ...]:

@@ -70,6 +70,7 @@ class Tracker(Component):
     windowed = True
     lockstep = True
     rewindable = True
+    least_width = 32  # a track's look takes some kB until its window ends
     ladders = LADDERS
     verified = (
         Verified("estimates and covariances, update by update", "Stone Soup 1.9.1, frozen results",

@@ -1,4 +1,4 @@
-"""What a block is: its inputs and outputs, what it is told, and the class it derives from."""
+"""What a block is: the class that it derives from, and what it is told of its run."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,109 +18,16 @@ from dsa_des.block.parameters import Rational as Rational
 from dsa_des.block.parameters import ScenePath as ScenePath
 from dsa_des.block.parameters import SourcedText as SourcedText
 from dsa_des.block.parameters import as_written as as_written
+from dsa_des.block.ports import Consumer as Consumer
+from dsa_des.block.ports import Input as Input
+from dsa_des.block.ports import Output as Output
+from dsa_des.block.ports import Producer as Producer
 from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Stream, Streams
 
 if TYPE_CHECKING:
     from dsa_des.block.wake import Wake
-
-
-Mode = Literal["sampled", "queued", "trigger"]
-
-
-@dataclass(frozen=True)
-class Input:
-    """One input of a block.
-
-    Parameters
-    ----------
-    message : type of Message
-        What may arrive; a subclass is accepted too.
-    mode : {"sampled", "queued", "trigger"}
-        ``sampled`` holds the last message, ``queued`` keeps all that came since the block's last
-        run, ``trigger`` also makes the block run when a message arrives.
-    doc : str
-        One sentence for ``dsa-des components``.
-    required : bool
-        Whether a scene must connect it. A block does not run before every required sampled or
-        trigger input with a single writer holds a first message.
-    many : bool
-        Whether several writers may be connected; they are seen in the order of their names.
-    """
-
-    message: type[Message]
-    mode: Mode = "sampled"
-    doc: str = ""
-    required: bool = True
-    many: bool = False
-
-    @property
-    def held(self) -> bool:
-        """Whether the block sees the last message, rather than all that came since its last run."""
-        return self.mode != "queued" and not self.many
-
-
-@dataclass(frozen=True)
-class Output:
-    """One output of a block.
-
-    Parameters
-    ----------
-    message : type of Message
-    doc : str
-        One sentence for ``dsa-des components``.
-    """
-
-    message: type[Message]
-    doc: str = ""
-
-
-@dataclass(frozen=True)
-class Consumer:
-    """A block fed by one of our outputs, and what it asks of us.
-
-    Parameters
-    ----------
-    block : str
-        Its name in the scene.
-    port : str
-        Its input.
-    request : object
-        What its `Component.request` returned for that input.
-    """
-
-    block: str
-    port: str
-    request: Any
-
-
-@dataclass(frozen=True)
-class Producer:
-    """A block that feeds one of our inputs, and what it says of itself.
-
-    Parameters
-    ----------
-    block : str
-        Its name in the scene.
-    port : str
-        Our input.
-    offer : object
-        What its `Component.offer` returned for the output it feeds us from.
-    latest_s : Fraction
-        How late its messages come at most: latency, delay and jitter of the wire.
-    jitter_s : Fraction
-        How much of that is drawn anew for every message.
-    unforeseen : bool
-        Whether they may come later still: they wait for a processor, or for a number of scans.
-    """
-
-    block: str
-    port: str
-    offer: Any
-    latest_s: Fraction = Fraction(0)
-    jitter_s: Fraction = Fraction(0)
-    unforeseen: bool = False
 
 
 @dataclass
@@ -197,6 +104,9 @@ class Component:
     #: parameters, or what its neighbours say, change while a run lasts, another instance goes on
     #: with these. None where the block does not say: it goes on as it is.
     remembers: ClassVar[tuple[str, ...] | None] = None
+    #: How many targets a row counts as at least, where windows of a single run are sized: what the
+    #: block makes of each row is there until its window ends.
+    least_width: ClassVar[int] = 4
     #: "own": runs on the clock of its parameters (or only when triggered);
     #: "demand": runs at the scan instants of the clocked blocks downstream.
     clocked: ClassVar[Literal["own", "demand"]] = "own"
@@ -426,7 +336,9 @@ __all__ = [
     "Component",
     "Consumer",
     "Context",
+    "Input",
     "NonNegativeRational",
+    "Output",
     "Parameters",
     "PositiveRational",
     "Producer",

@@ -1,13 +1,14 @@
 """One wake of a block: the instants it runs at, its inputs there and what it answers."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks
+from dsa_des.arrays.run_ticks import RunTicks, positions_among, says_no_runs
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message
 
@@ -174,3 +175,57 @@ def by_output(result: Any, outputs: Collection[str]) -> Mapping[str, Message]:
             f"{', '.join(sorted(outputs)) or 'nothing'}"
         )
     return {next(iter(outputs)): result}
+
+
+def checked_messages(
+    result: Any, outputs: Mapping[str, Any], ran: RunTicks
+) -> Iterator[tuple[str, Message]]:
+    """Give what a block returned when it ran, by output; messages without rows are left out.
+
+    TypeError or ValueError if one is not what its output declares, or of other instants than `ran`.
+    """
+    for port, message in by_output(result, outputs).items():
+        declared = outputs.get(port)
+        if declared is None:
+            raise TypeError(f"returned a message for {port!r}, which is not one of its outputs")
+        if not isinstance(message, declared.message):
+            raise TypeError(
+                f"output {port!r} is declared to send {declared.message.__name__}, "
+                f"not {type(message).__name__}"
+            )
+        if len(message.tick) == 0:
+            continue
+        message.check()
+        yield port, _with_runs(port, message, ran)
+
+
+def _with_runs(port: str, message: Message, ran: RunTicks) -> Message:
+    """Return a message that says of which runs its rows are, if its block does not say it.
+
+    Rows that are not of instants at which the block ran, in order, are refused: what a row is dated
+    with is when it was made, which decides when it arrives and where it stands in the recording.
+    """
+    sent = message.tick
+    if sent is ran.tick:
+        message = message if says_no_runs(ran.run) else copy(message)
+        message.instants = ran  # with what is known of them
+        return message
+    if sent.dtype == np.int64:
+        if not says_no_runs(ran.run) and says_no_runs(message.run):
+            if ran.one_run:
+                message = message.of_runs(np.full(len(sent), ran.run[0], dtype=np.int64))
+            elif np.array_equal(sent, ran.tick):
+                message = message.of_runs(ran.run)
+            else:
+                raise ValueError(
+                    f"output {port!r} has {len(sent)} rows, and the wake {len(ran)} of several "
+                    "runs: the message must say of which run each is (`run = wake.run[rows]`)"
+                )
+        position, there = positions_among(ran, message.instants)
+        if there is None and bool((position[1:] >= position[:-1]).all()):
+            return message
+    raise ValueError(
+        f"output {port!r} has ticks [{sent[0]} ... {sent[-1]}] of type {sent.dtype}; "
+        f"they must be int64 and lie in the instants it ran at, in order: those of the wake "
+        f"[{ran.tick[0]} ... {ran.tick[-1]}], also where an input speaks of an earlier one"
+    )

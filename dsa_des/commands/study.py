@@ -267,7 +267,7 @@ def show_study(
 def _measure(folder: StudyFolder, silent: bool = False) -> None:
     """Measure the errors of the models of a study's first run, and keep them in its folder."""
     from dsa_des.commands.cost import CostProgress
-    from dsa_des.studies.models import measure_errors
+    from dsa_des.costs.models import measure_errors
 
     try:
         measure_errors(folder, CostProgress(silent=silent).say)

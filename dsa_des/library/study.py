@@ -10,7 +10,7 @@ from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 from weakref import finalize
 
-from dsa_des.block.class_text import classes_in
+from dsa_des.block.registry import classes_in
 from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.library.scenes import scene_of_any
 from dsa_des.record.drawing import kept_figures, pictures_in

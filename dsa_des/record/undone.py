@@ -88,14 +88,19 @@ class Tries:
     did: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def with_more(self, run: IntArray, had: Any, did: BoolArray) -> "Tries":
-        """Return them with masks of what some runs had, and whether it was done with them."""
+        """Return them with masks of what some runs had, and whether it was done with them.
+
+        The cases of each run stand together.
+        """
         if not len(run):
             return self
-        count = max(int(run.max()) + 1, len(self.did))
+        first = np.flatnonzero(np.append(True, run[1:] != run[:-1]))
+        mine = run[first]
+        count = max(int(mine.max()) + 1, len(self.did))
         every, done = np.zeros(count, dtype=had.dtype), np.zeros(count, dtype=bool)
         every[: len(self.had)], done[: len(self.did)] = self.had, self.did
-        np.bitwise_or.at(every, run, had)
-        done[run[did]] = True
+        every[mine] |= np.bitwise_or.reduceat(had, first)
+        done[mine] |= np.logical_or.reduceat(did, first)
         return Tries(every, done)
 
     def undone(self, what: str, *, of_two: bool = False) -> dict[str, IntArray]:

@@ -162,10 +162,8 @@ def _takes_windows(cls: type[Component]) -> bool:
     return cls.windowed and cls.process is None
 
 
-# A window of about this many target-scans keeps NumPy's calls long and its arrays in cache. In a
-# single run, which may be long, a scan counts as so many at least: all that blocks make of it stays
-# until the window ends, and a tracker keeps some kB.
-CELLS_PER_WINDOW, _LEAST_WIDTH = 131072, 32
+# A window of about this many target-scans keeps NumPy's calls long and its arrays in cache.
+CELLS_PER_WINDOW = 131072
 
 
 def scans_of(nodes: Mapping[str, Node], runs: Runs) -> float:
@@ -189,8 +187,10 @@ def longest_window(nodes: Mapping[str, Node], runs: Runs, window: int | None) ->
     `window` are scans of all clocks together; by default, and where blocks run scan by scan anyway,
     as many as make a window of `CELLS_PER_WINDOW`.
     """
-    width = max(node.component.width for node in nodes.values())
-    width = max(width, 1 if runs.count > 1 else _LEAST_WIDTH)
+    components = [node.component for node in nodes.values()]
+    width = max(1, *(component.width for component in components))
+    if runs.count == 1:  # which may be long
+        width = max(width, *(component.least_width for component in components))
     scans = window if window not in (None, 1) else max(1, CELLS_PER_WINDOW // width)
     per_tick = sum((1 / clock.period for clock in _clocks(nodes.values())), Fraction(0))
     return max(1, int(scans / per_tick)) if per_tick else runs.run_ticks

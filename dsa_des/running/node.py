@@ -5,7 +5,6 @@ the others by depth; ties within a depth go by name, or at random under ``shuffl
 """
 
 from collections.abc import Callable, Generator, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -18,14 +17,13 @@ from dsa_des.arrays.run_ticks import (
     last_of_run,
     no_runs,
     positions_among,
-    says_no_runs,
     union,
 )
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Component, RunEnd
 from dsa_des.block.foreign_calls import must_pass
 from dsa_des.block.message import Message
-from dsa_des.block.wake import Wake, by_output
+from dsa_des.block.wake import Wake, checked_messages
 from dsa_des.errors import RunRefused
 from dsa_des.running.channel import Channel, Inputs
 from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
@@ -314,7 +312,7 @@ class Node:
         ticks = wake.ticks
         if not self._all_ran:
             self._ran = ~self._idle_runs()
-            self._ran[wake.run] = True
+            self._ran[wake.run[wake.instants.first_of_each]] = True
             self._all_ran = bool(self._ran.all())
         try:
             if self.stretched is None:
@@ -359,20 +357,7 @@ class Node:
 
         `ran` are the instants that it ran at; it sets out at `leaves`, where that is later.
         """
-        outputs = self.component.outputs
-        for port, message in by_output(result, outputs).items():
-            declared = outputs.get(port)
-            if declared is None:
-                raise TypeError(f"returned a message for {port!r}, which is not one of its outputs")
-            if not isinstance(message, declared.message):
-                raise TypeError(
-                    f"output {port!r} is declared to send {declared.message.__name__}, "
-                    f"not {type(message).__name__}"
-                )
-            if len(message.tick) == 0:
-                continue
-            message.check()
-            message = _of_their_runs(port, message, ran)
+        for port, message in checked_messages(result, self.component.outputs, ran):
             if isinstance(message, RunEnd):
                 self.simulation.runs.note_ends(message.instants, self.name)
             if self.simulation.recorder is not None:
@@ -419,35 +404,3 @@ def _no_scans(rows: int) -> IntArray:
 
 def _now(tick: int) -> RunTicks:
     return RunTicks(no_runs(1), np.array([tick], dtype=np.int64))
-
-
-def _of_their_runs(port: str, message: Message, ran: RunTicks) -> Message:
-    """Return a message that says of which runs its rows are, if its block does not say it.
-
-    Rows that are not of instants at which the block ran, in order, are refused: what a row is dated
-    with is when it was made, which decides when it arrives and where it stands in the recording.
-    """
-    sent = message.tick
-    if sent is ran.tick:
-        message = message if says_no_runs(ran.run) else copy(message)
-        message.instants = ran  # with what is known of them
-        return message
-    if sent.dtype == np.int64:
-        if not says_no_runs(ran.run) and says_no_runs(message.run):
-            if ran.one_run:
-                message = message.of_runs(np.full(len(sent), ran.run[0], dtype=np.int64))
-            elif np.array_equal(sent, ran.tick):
-                message = message.of_runs(ran.run)
-            else:
-                raise ValueError(
-                    f"output {port!r} has {len(sent)} rows, and the wake {len(ran)} of several "
-                    "runs: the message must say of which run each is (`run = wake.run[rows]`)"
-                )
-        position, there = positions_among(ran, message.instants)
-        if there is None and bool((position[1:] >= position[:-1]).all()):
-            return message
-    raise ValueError(
-        f"output {port!r} has ticks [{sent[0]} ... {sent[-1]}] of type {sent.dtype}; "
-        f"they must be int64 and lie in the instants it ran at, in order: those of the wake "
-        f"[{ran.tick[0]} ... {ran.tick[-1]}], also where an input speaks of an earlier one"
-    )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.class_text import sourced
+from dsa_des.block.registry import sourced
 from dsa_des.errors import Problem, did_you_mean
 from dsa_des.scene.keys import Key, dotted, is_new_item, names_of, no_item, place_of, step, unquoted
 

@@ -12,10 +12,9 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.class_text import sourced, type_text
 from dsa_des.block.component import Component, SourcedText, as_written
 from dsa_des.block.entry_points import COMPONENTS
-from dsa_des.block.registry import NotImported, UnknownType, find
+from dsa_des.block.registry import NotImported, UnknownType, find, sourced, type_text
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.files.toml_files import DEEPEST, NotToml, TomlError, parse_toml
 from dsa_des.scene.block_table import BlockOptions
@@ -25,6 +24,8 @@ from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_tables
 #: A dotted key and its value, or ``swap.BLOCK`` and a type.
 Change = tuple[str, Any]
 SWAP = "swap."
+#: Where messages say that a change in Python was written.
+IN_SET, IN_SWAP = "scene.set", "scene.swap"
 
 
 def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:
@@ -88,6 +89,29 @@ def read_changes(
     own = (("seed", seed), ("duration_s", duration_s))
     changes += [(key, given) for key, given in own if given is not None]
     return changes, problems + wrong
+
+
+def read_program(values: Mapping[Any, Any], source: str) -> list[Change]:
+    """Return what a program changes by `IN_SET` or `IN_SWAP`; SceneError with all that is wrong."""
+    changes: list[Change] = []
+    problems: list[Problem] = []
+    for key, value in values.items():
+        if not isinstance(key, str):
+            problems.append(Problem(source, "", "a key must be text", key))
+        elif source == IN_SET and key.startswith(SWAP):
+            problems.append(Problem(source, key, "types are changed with scene.swap"))
+        elif source == IN_SWAP and not isinstance(value, str | type):
+            message = "must be a registered name, module:Class, or a class"
+            problems.append(Problem(source, key, message, value))
+        else:
+            try:
+                name = key if source == IN_SET else SWAP + key
+                changes.append((name, scene_value(value)))
+            except TypeError as error:
+                problems.append(Problem(source, key, str(error)))
+    if problems:
+        raise SceneError(problems)
+    return changes
 
 
 def apply_changes(

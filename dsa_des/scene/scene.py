@@ -39,12 +39,13 @@ from dsa_des.scene.checks import (
 from dsa_des.scene.graph import build_graph, check_graph
 from dsa_des.scene.keys import Key, dotted, key_in
 from dsa_des.scene.overrides import (
-    SWAP,
+    IN_SET,
+    IN_SWAP,
     Change,
     apply_changes,
     read_changes,
+    read_program,
     read_sets,
-    scene_value,
 )
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.scene.wiring import Wire, read_wires, with_latencies
@@ -57,8 +58,6 @@ _TOP_LEVEL = (
 _TOLERANCE = "accuracy"
 # Of what a scene is shown as in Python.
 _WIDTH, _MOST_LINES = 84, 5
-#: Where messages say that a change in Python was written.
-_SET, _SWAP = "scene.set", "scene.swap"
 
 
 @dataclass(repr=False)
@@ -163,9 +162,9 @@ class Scene:
         if isinstance(values, str):
             read, problems = read_sets((values, *more))
             if problems:
-                raise SceneError(replace(one, source=_SET) for one in problems)
+                raise SceneError(replace(one, source=IN_SET) for one in problems)
             values = dict(read)
-        return self._changed(values, _SET)
+        return self._changed(values, IN_SET)
 
     def swap(
         self,
@@ -188,27 +187,10 @@ class Scene:
         SceneError
             With every problem that the new scene has.
         """
-        return self._changed({**(types or {}), **more}, _SWAP)
+        return self._changed({**(types or {}), **more}, IN_SWAP)
 
     def _changed(self, values: Mapping[str, Any], source: str) -> "Scene":
-        changes: list[Change] = []
-        problems: list[Problem] = []
-        for key, value in values.items():
-            if not isinstance(key, str):
-                problems.append(Problem(source, "", "a key must be text", key))
-            elif source == _SET and key.startswith(SWAP):
-                problems.append(Problem(source, key, "types are changed with scene.swap"))
-            elif source == _SWAP and not isinstance(value, str | type):
-                message = "must be a registered name, module:Class, or a class"
-                problems.append(Problem(source, key, message, value))
-            else:
-                try:
-                    name = key if source == _SET else SWAP + key
-                    changes.append((name, scene_value(value)))
-                except TypeError as error:
-                    problems.append(Problem(source, key, str(error)))
-        if problems:
-            raise SceneError(problems)
+        changes = read_program(values, source)
         file, before = self.origin
         return changed_tables(file, (*before, *changes))
 
@@ -335,7 +317,7 @@ def load_tables(
 def changed_tables(file: SceneFile, changes: tuple[Change, ...]) -> Scene:
     """Return the checked scene that a program's changes make of tables; those stay as they are."""
     changed = file.copy()
-    dropped = apply_changes(changed, changes, _SET, _SWAP, "")
+    dropped = apply_changes(changed, changes, IN_SET, IN_SWAP, "")
     scene = check_scene(changed)
     scene.dropped, scene._origin = dropped, (file, changes)
     return scene

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.class_text import sourced
+from dsa_des.block.registry import sourced
 from dsa_des.block.shipped_files import files_named, shipped_files
 from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.files.input_files import (

@@ -9,7 +9,7 @@ import gc
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -29,7 +29,6 @@ from dsa_des.files.sealed_files import parquet
 from dsa_des.record.undone import Undone, added
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas, undone_in
-from dsa_des.replicas.splitting import FlownRuns, find_levels, repeated
 from dsa_des.results.folder import undone_of
 from dsa_des.results.record import (
     CRASHED,
@@ -42,8 +41,9 @@ from dsa_des.results.record import (
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Allocation
-from dsa_des.studies.foreseen import foresee, geometry_of, stands_for
-from dsa_des.studies.metric import Group, Metric, SplitEvent, wanted_by
+from dsa_des.studies.foreseen import foresee_all, geometry_of, stands_for
+from dsa_des.studies.metric import Group, Metric, no_values, one_by_one, wanted_by
+from dsa_des.studies.splitting import Nearness, SplitEvent, split
 from dsa_des.studies.study import Chunk, Study, set_text
 
 #: After so many runs at once a worker looks for garbage, or the next ones stand beside it.
@@ -199,13 +199,9 @@ def _table(
         if field.name in rows:
             arrays.append(pa.array(rows[field.name], type=field.type))
         else:
-            column = values.get(field.name, _nothing(count, text=field.type == pa.string()))
+            column = values.get(field.name, no_values(count, text=field.type == pa.string()))
             arrays.append(pa.array(column, type=field.type, from_pandas=True))
     return pa.Table.from_arrays(arrays, schema=schema)
-
-
-def _nothing(count: int, *, text: bool) -> AnyArray:
-    return np.full(count, None, dtype=object) if text else np.full(count, np.nan)
 
 
 def _run_cell(
@@ -231,12 +227,25 @@ def _run_cell(
     replicas = [study.replica(number, cell) for number in numbers]
     key = str(study.path), cell
     if isinstance(metrics[0], SplitEvent):
-        rows["error"], values = _split(study, scene, metrics[0], cell, numbers, of, undone)
+        assert study.splitting is not None
+
+        def measure(
+            nearness: Nearness, runs: Sequence[Replica], number: IntArray
+        ) -> tuple[dict[str, AnyArray], list[str | None]]:
+            wrong: list[str | None] = [None] * len(runs)
+            chunk_of, said = np.append(of, len(undone)), [*undone, []]  # that of the pilot is lost
+            return _flown(scene, [nearness], runs, wrong, key, chunk_of[number], said), wrong
+
+        rows["error"], values = split(
+            study.splitting, metrics[0], numbers, lambda number: study.repetition(number, cell),
+            measure, known=repr((study.tables, study.base.data, study.seed, study.sets,
+                                 study.swaps, cell)),
+        )  # fmt: skip
         return _table(study, schema, cell, rows, values)
     if not study.allocate:
         values = _flown(scene, metrics, replicas, rows["error"], key, of, undone)
         return _table(study, schema, cell, rows, values)
-    known, errors = _foreseen(scene, metrics, replicas)
+    known, errors = foresee_all(scene, metrics, replicas)
     for k, text in errors.items():
         rows["error"][k] = text
     results = [result for metric in metrics for result in metric.results()]
@@ -249,65 +258,9 @@ def _run_cell(
         rows["error"][k] = said
     values = {}
     for name, column in flown.items():
-        values[name] = _nothing(len(numbers), text=column.dtype == object)
+        values[name] = no_values(len(numbers), text=column.dtype == object)
         values[name][chosen] = column
     return _table(study, schema, cell, rows, values | known | {STANDS_FOR: shares})
-
-
-def _split(
-    study: Study,
-    scene: Scene,
-    metric: SplitEvent,
-    cell: int,
-    numbers: Sequence[int],
-    of: IntArray,
-    undone: Sequence[list[Undone]],
-) -> tuple[list[str | None], dict[str, AnyArray]]:
-    """Return the error of each of some repetitions, or None, and what they came to."""
-    table, key = study.splitting, (str(study.path), cell)
-    assert table is not None
-    score, candidates = table.score, metric.metric.scores[table.score]
-
-    def fly(runs: Sequence[Replica], number: IntArray, levels: Sequence[float]) -> FlownRuns:
-        wrong: list[str | None] = [None] * len(runs)
-        near, said = [metric.scored(score, levels)], [*undone, []]  # that of the pilot is lost
-        known = _flown(scene, near, runs, wrong, key, np.append(of, len(undone))[number], said)
-        nothing = np.full(len(runs), np.nan)
-        times_s = [known.get(str(k), nothing) for k in range(len(levels))]
-        return FlownRuns(np.array(times_s), known.get("weight", nothing), wrong)
-
-    known = repr((study.tables, study.base.data, study.seed, study.sets, study.swaps, cell))
-    try:
-        if table.levels is not None:
-            levels = (*table.levels, float(candidates[-1]))
-        elif (levels := _levels_found.get(known, ())) == ():
-            pilot = study.repetition(-1, cell), study.repetition_seed(-1, cell)
-            levels = _levels_found[known] = find_levels(*pilot, candidates, fly)
-    except ValueError as error:
-        return [str(error)] * len(numbers), {}
-    found = repeated(
-        [study.repetition(number, cell) for number in numbers],
-        [study.repetition_seed(number, cell) for number in numbers], levels, fly,
-    )  # fmt: skip
-    return [one.error for one in found], metric.told(found, levels)
-
-
-#: By all that fixes them: every process finds the levels of a study by itself, and the same ones.
-_levels_found: dict[str, tuple[float, ...]] = {}
-
-
-def _foreseen(
-    scene: Scene, metrics: Sequence[Metric], replicas: Sequence[Replica]
-) -> tuple[dict[str, AnyArray], dict[int, str]]:
-    """Return what is known of runs before they are flown, and the error of each that gave none."""
-    try:
-        return foresee(scene, metrics, replicas), {}
-    except BaseException as error:
-        if must_pass(error):
-            raise
-        if len(replicas) == 1:
-            return {}, {0: f"before it is flown: {error_text(error)}"}
-    return _one_by_one(partial(_foreseen, scene, metrics), replicas)
 
 
 def _flown(
@@ -350,7 +303,7 @@ def _flown(
                 errors[done + k] = outcome.error
         result, wrong = _measured(scene, metrics, [(part[k], outcomes[k]) for k in good])
         for name, column in result.items():
-            nothing = _nothing(len(replicas), text=column.dtype == object)
+            nothing = no_values(len(replicas), text=column.dtype == object)
             values.setdefault(name, nothing)[done + np.array(good)] = column
         for k, text in wrong.items():
             errors[done + good[k]] = text
@@ -414,22 +367,5 @@ def _measured(
                 raise
             if len(runs) == 1:
                 return {}, {0: f"metric {type(metric).__name__}: {error_text(error)}"}
-            return _one_by_one(partial(_measured, scene, metrics), runs)
+            return one_by_one(partial(_measured, scene, metrics), runs)
     return values, {}
-
-
-def _one_by_one(
-    measure: Callable[[Sequence[Any]], tuple[dict[str, AnyArray], dict[int, str]]],
-    runs: Sequence[Any],
-) -> tuple[dict[str, AnyArray], dict[int, str]]:
-    """Measure each run by itself, so that one that breaks a metric leaves the others alone."""
-    result: dict[str, AnyArray] = {}
-    errors: dict[int, str] = {}
-    for k, run in enumerate(runs):
-        values, wrong = measure([run])
-        if wrong:
-            errors[k] = wrong[0]
-        for name, column in values.items():
-            nothing = _nothing(len(runs), text=column.dtype == object)
-            result.setdefault(name, nothing)[k] = column[0]
-    return result, errors

@@ -6,11 +6,13 @@ foresee nominal events, weights and geometry; ratios say which columns are event
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.record import EVENT, RATIO, STANDS_FOR, RatioOf, Result, geometry_column
@@ -27,7 +29,7 @@ from dsa_des.studies.allocation import (
     learn,
 )
 from dsa_des.studies.draws import uniform
-from dsa_des.studies.metric import Group, Metric, expected_column
+from dsa_des.studies.metric import Group, Metric, expected_column, one_by_one
 from dsa_des.studies.study import AUTO, Study
 
 #: Runs that are foreseen at a time, at most: few enough for the memory, many for the work.
@@ -85,6 +87,20 @@ def foresee(
         for name, values in mine.items():
             parts.setdefault(name, []).append(values)
     return {name: np.concatenate(values) for name, values in parts.items()}
+
+
+def foresee_all(
+    scene: Scene, metrics: Sequence[Metric], replicas: Sequence[Replica]
+) -> tuple[dict[str, AnyArray], dict[int, str]]:
+    """Return what is known of runs before they are flown, and the error of each that gave none."""
+    try:
+        return foresee(scene, metrics, replicas), {}
+    except BaseException as error:
+        if must_pass(error):
+            raise
+        if len(replicas) == 1:
+            return {}, {0: f"before it is flown: {error_text(error)}"}
+    return one_by_one(partial(foresee_all, scene, metrics), replicas)
 
 
 def stands_for(

@@ -1,4 +1,7 @@
-"""The content of ``study.json``: the digest of all that fixes a study's results, and its record."""
+"""What fixes a study's results, by its digest, and of what its runs are made.
+
+It is the content of ``study.json`` and ``explained.json``.
+"""
 
 import contextlib
 import hashlib
@@ -11,10 +14,16 @@ from typing import Any, Literal, get_args, get_origin
 
 from dsa_des.block.mark import Mark, marks_of
 from dsa_des.block.source_file import file_of, is_file, path_of, split_name
-from dsa_des.errors import SceneError, UsageError
+from dsa_des.costs.models import scene_record
+from dsa_des.errors import BlockFailure, SceneError, UsageError
 from dsa_des.files.input_files import resolve_home
 from dsa_des.files.output_folder import RUN_JSON
+from dsa_des.files.toml_files import to_toml
 from dsa_des.record.version import __version__
+from dsa_des.replicas.changed_scene import scene_of
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.labels import short
+from dsa_des.results.models import EXPLAINED, Explained, SceneRecord, read_explained, versions
 from dsa_des.results.record import Result, StudyRecord, draw_column
 from dsa_des.scene.keys import in_words
 from dsa_des.scene.scene import Scene
@@ -23,8 +32,11 @@ from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import file_digest
 from dsa_des.studies.foreseen import geometry_of
 from dsa_des.studies.study import Study, set_text
+from dsa_des.studies.study_checks import one_per_value
 from dsa_des.studies.study_tables import json_safe
 
+#: Cells that are looked at: the first, and one for each value of an axis.
+_MOST_CELLS = 12
 #: Texts for people, which name no file.
 _PROSE = ("title", "description", "labels")
 
@@ -223,3 +235,36 @@ def record_text(study: Study, digest: str) -> str:
         "tables": study.tables,
     }
     return json.dumps(json_safe(content), indent=2, allow_nan=False) + "\n"
+
+
+def explained(study: Study) -> Explained:
+    """Return of what a study's runs are made."""
+    scenes: list[SceneRecord] = []
+    text = ""
+    for cell in one_per_value(study)[:_MOST_CELLS]:
+        labels = study.labels(cell)
+        where = ", ".join(f"{name} = {short(value)}" for name, value in labels.items())
+        try:
+            scene = scene_of(study.scene(cell), study.replica(0, cell))
+            record = scene_record(where, scene)
+            text = text or to_toml(scene.resolved())
+        except (SceneError, BlockFailure, ValueError):
+            continue  # its rows say why
+        scenes.append(_less(record, scenes[0]) if scenes else record)
+    scenes = [one for one in scenes if one.models or one.effects or one.spared]
+    return Explained(versions=versions(), scene=text, scenes=scenes)
+
+
+def _less(result: SceneRecord, first: SceneRecord) -> SceneRecord:
+    """Return what is not so in the first scene."""
+    lists = ("models", "effects", "spared")
+    new = {n: [one for one in getattr(result, n) if one not in getattr(first, n)] for n in lists}
+    return result.model_copy(update=new)
+
+
+def keep_explained(study: Study, folder: StudyFolder) -> None:
+    """Write ``explained.json`` into a study's folder, unless it is there."""
+    if read_explained(folder) is None:
+        content = explained(study).model_dump()
+        text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+        folder.write_file(EXPLAINED, text.encode())

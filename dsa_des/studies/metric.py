@@ -13,16 +13,15 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
-from dsa_des.block.class_text import ClassText
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import NotImportable, load_named, load_point
 from dsa_des.block.message import Columns, Text
+from dsa_des.block.registry import ClassText
 from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.drawn_columns import ReplicaScenes, scenes_of
 from dsa_des.replicas.replicas import Recorded
-from dsa_des.replicas.splitting import Repeated
 from dsa_des.results.record import (
     CLASS,
     EVENT,
@@ -42,7 +41,7 @@ from dsa_des.scene.scene import Scene
 __all__ = [
     "CLASS", "EVENT", "FRACTION", "KEY", "METRICS", "NUMBER", "RATIO", "SHARE", "TRIALS", "Group",
     "Metric", "RatioOf", "Result", "Told", "check_recorded", "check_tables", "expected_column",
-    "find_metric", "recorded_by", "wanted_by",
+    "find_metric", "no_values", "one_by_one", "recorded_by", "wanted_by",
 ]  # fmt: skip
 
 METRICS = "dsa_des.metrics"
@@ -240,65 +239,6 @@ class Metric:
         return {}
 
 
-class Nearness(Metric):
-    """When each run first reached levels of the score of an event, and how much it weighs."""
-
-    def __init__(self, metric: Metric, event: str, score: str, levels: Sequence[float]) -> None:
-        self._metric, self._asked = metric, (event, score, levels)
-        self.tables = metric.tables
-
-    def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return the times, s, by the number of the level; NaN for never."""
-        times_s = self._metric.reached_s(group, *self._asked)
-        weights = self._metric.unit_weights(group)
-        return {"weight": weights} | {str(k): one for k, one in enumerate(times_s)}
-
-
-class SplitEvent(Metric):
-    """What a repetition tells of an event, which a metric gives of a run."""
-
-    def __init__(self, metric: Metric, event: str) -> None:
-        super().__init__(metric.p, metric.scene)
-        self.metric, self.event = metric, event
-        self.tables = metric.tables
-
-    def results(self) -> list[Result]:
-        """Return the probability, and how a repetition came to it."""
-        of = {result.name: result.meaning for result in self.metric.results()}
-        name = self.event
-        return [
-            Result(name, NUMBER, f"probability by splitting: {of.get(name, name)}",
-                   least=0.0, most=1.0, unseen=f"{name}.unseen"),
-            Result(f"{name}.unseen", NUMBER, "what one run more that comes to it would add",
-                   least=0.0),
-            Result(f"{name}.collapsed", EVENT, "no run came to it: its P is 0, and counts"),
-            Result(f"{name}.runs", NUMBER, "runs that were flown", least=0.0),
-            Result(f"{name}.levels", CLASS, "levels of the score"),
-        ]  # fmt: skip
-
-    def scored(self, score: str, levels: Sequence[float]) -> Nearness:
-        """Return what tells when runs reach some levels of a score."""
-        return Nearness(self.metric, self.event, score, levels)
-
-    def told(self, found: Sequence[Repeated], levels: Sequence[float]) -> dict[str, AnyArray]:
-        """Return result → values of some repetitions; NaN and None of those that failed."""
-        text = ", ".join(f"{level:.4g}" for level in levels[:-1]) or "none"
-        values = {
-            "": [one.probability for one in found],
-            ".unseen": [one.unseen for one in found],
-            ".collapsed": [float(one.probability == 0.0) for one in found],
-            ".runs": [float(one.flown) for one in found],
-        }
-        failed = np.array([one.error is not None for one in found])
-        return {
-            f"{self.event}{name}": np.where(failed, np.nan, some) for name, some in values.items()
-        } | {f"{self.event}.levels": np.array([None if f else text for f in failed], dtype=object)}
-
-    def check(self, blocks: Mapping[str, Component]) -> None:
-        """Raise ValueError for what the metric itself finds wrong."""
-        self.metric.check(blocks)
-
-
 def expected_column(event: str) -> str:
     """Return the name in `Metric.geometry` of the chance that is expected of an event."""
     return f"expected.{event}"
@@ -374,3 +314,25 @@ def wanted_by(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:
         for table, columns in metric.tables.items():
             wanted.setdefault(table, {"tick"}).update(columns)
     return {table: tuple(sorted(columns)) for table, columns in sorted(wanted.items())}
+
+
+def no_values(count: int, *, text: bool) -> AnyArray:
+    """Return what stands for as many values that are not there."""
+    return np.full(count, None, dtype=object) if text else np.full(count, np.nan)
+
+
+def one_by_one(
+    measure: Callable[[Sequence[Any]], tuple[dict[str, AnyArray], dict[int, str]]],
+    runs: Sequence[Any],
+) -> tuple[dict[str, AnyArray], dict[int, str]]:
+    """Measure each run by itself, so that one that breaks a metric leaves the others alone."""
+    result: dict[str, AnyArray] = {}
+    errors: dict[int, str] = {}
+    for k, run in enumerate(runs):
+        values, wrong = measure([run])
+        if wrong:
+            errors[k] = wrong[0]
+        for name, column in values.items():
+            nothing = no_values(len(runs), text=column.dtype == object)
+            result.setdefault(name, nothing)[k] = column[0]
+    return result, errors

@@ -20,8 +20,7 @@ from dsa_des.results.tables import Expected, Tables
 from dsa_des.studies.chunk import Done, done_of, joined
 from dsa_des.studies.executors import Executor
 from dsa_des.studies.foreseen import plans_of
-from dsa_des.studies.identity import record_of, results_of
-from dsa_des.studies.models import keep_explained
+from dsa_des.studies.identity import keep_explained, record_of, results_of
 from dsa_des.studies.study import Chunk, Study
 
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.block.class_text import sourced
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
+from dsa_des.block.registry import sourced
 from dsa_des.block.source_file import absolute
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.record import FigureRecord, Requirement, StopWhen, as_text, run_command
@@ -24,7 +24,8 @@ from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.allocation import Allocation, round_ends
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, member_seed, replica_seed
-from dsa_des.studies.metric import Metric, SplitEvent, find_metric
+from dsa_des.studies.metric import Metric, check_tables, find_metric
+from dsa_des.studies.splitting import SplitEvent, Splitting
 from dsa_des.studies.study_tables import existing_file
 from dsa_des.text.safe_text import shell_line
 from dsa_des.time.randomness import key_of
@@ -43,8 +44,6 @@ class MetricSpec:
 
     def build(self, scene: Scene) -> Metric:
         """Return the metric for a scene."""
-        from dsa_des.studies.metric import check_tables
-
         cls = find_metric(self.name, (scene.path.parent,))
         try:
             with foreign_code(ValueError):
@@ -53,21 +52,6 @@ class MetricSpec:
                 return SplitEvent(metric, self.splits) if self.splits else metric
         except ForeignFailure as error:
             raise ValueError(f"metric {self.name} cannot be made: {error}") from error.__cause__
-
-
-@dataclass(frozen=True)
-class Splitting:
-    """How the probability of an event is found by splitting.
-
-    Levels are of the score and fall; without any a pilot finds them.
-    """
-
-    event: str
-    #: By which runs that come near are told, of those that the metric has.
-    score: str
-    #: Of each stage of a repetition.
-    runs: int
-    levels: tuple[float, ...] | None = None
 
 
 #: For the sake of all ratios.
@@ -206,24 +190,20 @@ class Study:
             {draw.key: draw.value(seed, number, self.batch) for draw in self.draws},
         )
 
-    def repetition(self, number: int, cell: int) -> list[Replica]:
-        """Return the runs that a repetition of splitting begins with: each is one of a plain study.
+    def repetition(self, number: int, cell: int) -> tuple[list[Replica], int]:
+        """Return the runs that a repetition of splitting begins with, and its branches' seed.
 
-        Number -1 is the pilot, which has draws of its own.
+        Each of the runs is one of a plain study. Number -1 is the pilot, which has draws of its
+        own.
         """
         assert self.splitting is not None
-        runs = range(self.splitting.runs)
+        seed, runs = key_of(self.member_seed(cell), "study splitting", number), self.splitting.runs
         if number >= 0:
-            return [self.replica(number * len(runs) + k, cell) for k in runs]
-        seed = self.repetition_seed(number, cell)
+            return [self.replica(number * runs + k, cell) for k in range(runs)], seed
         return [
-            Replica(replica_seed(seed, k), {d.key: d.value(seed, k, len(runs)) for d in self.draws})
-            for k in runs
-        ]
-
-    def repetition_seed(self, number: int, cell: int) -> int:
-        """Return the seed of the branches of a repetition."""
-        return key_of(self.member_seed(cell), "study splitting", number)
+            Replica(replica_seed(seed, k), {d.key: d.value(seed, k, runs) for d in self.draws})
+            for k in range(runs)
+        ], seed
 
     def command(self, cell: int, number: int) -> str:
         """Return the command that runs one replica of a cell again."""

@@ -12,13 +12,13 @@ from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.results.record import FRACTION, NUMBER, RATIO, SHARE, TRIALS, Result
 from dsa_des.results.summary import of_series
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.graph import in_cycles
 from dsa_des.scene.keys import Key, key_in
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.draws import Draw
 from dsa_des.studies.foreseen import why_not_foreseen
-from dsa_des.studies.metric import Metric, SplitEvent, check_recorded
+from dsa_des.studies.metric import Metric, check_recorded
+from dsa_des.studies.splitting import SplitEvent, why_not_split
 from dsa_des.studies.study import AUTO, Study
 
 #: How many replicas the ends of a range are looked for in.
@@ -59,9 +59,13 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
             break
     if whole:
         _check_names(study, results, file)
-    if whole and study.splitting is not None and (wrong := _why_not_split(study, first)):
-        key, said, value = wrong
-        file.report(("splitting", key) if key else ("splitting",), said, *([value] if key else []))
+    if whole and study.splitting is not None:
+        split_event = study.metrics[0].build(first)
+        assert isinstance(split_event, SplitEvent)
+        if wrong := why_not_split(study.splitting, split_event, study.metrics[0].name):
+            key, said, value = wrong
+            at = ("splitting", key) if key else ("splitting",)
+            file.report(at, said, *([value] if key else []))
     if len(file.problems) == before:
         _check_set_up(study, scenes, file)
     if len(file.problems) == before:
@@ -73,36 +77,6 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
             why_not = str(error)
         if why_not:
             file.report(("allocate",), why_not)
-
-
-def _why_not_split(study: Study, scene: Scene) -> tuple[str, str, Any] | None:
-    """Return which key of the table, why, and which value makes splitting impossible; or None.
-
-    Asked before the first run.
-    """
-    table, split_event = study.splitting, study.metrics[0].build(scene)
-    assert table is not None and isinstance(split_event, SplitEvent)
-    hosted = [name for name, block in sorted(scene.blocks.items()) if block.cls.needs_host]
-    if hosted:
-        said = f"the block {hosted[0]} waits for a host program, and cannot be flown again"
-        return "", said, None
-    if not in_cycles(scene.graph):
-        return "", "the scene has no closed loop: nothing that is drawn changes a flight", None
-    metric = split_event.metric
-    events, scores = metric.scored_events(), metric.scores
-    if not events:
-        name = study.metrics[0].name
-        return "event", f"the metric {name} does not know how near a run comes", table.event
-    if table.event not in events:
-        said = f"is no event that {study.metrics[0].name} has a score of"
-        return "event", said + did_you_mean(table.event, events), table.event
-    if table.score not in scores:
-        return "score", f"is no score{did_you_mean(table.score, scores)}", table.score
-    least = float(scores[table.score][-1])
-    if table.levels and table.levels[-1] <= least:
-        said = f"must all be above {least:g}, which is the event itself"
-        return "levels", said, list(table.levels)
-    return None
 
 
 def _check_ends(study: Study, scenes: list[Scene], file: SceneFile) -> None:

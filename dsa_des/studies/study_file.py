@@ -13,7 +13,7 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.source_file import absolute
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS
-from dsa_des.results.record import FigureRecord, Requirement, StopWhen
+from dsa_des.results.record import Requirement, StopWhen
 from dsa_des.scene.checks import check_lookalikes, read_table
 from dsa_des.scene.examples import find_example
 from dsa_des.scene.keys import Key, flat
@@ -24,17 +24,16 @@ from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.axes import Axis, flatten_axes, label_of, parse_axis
 from dsa_des.studies.draws import Draw, flatten_draws, parse_draw
 from dsa_des.studies.metric import METRICS, find_metric
-from dsa_des.studies.study import MetricSpec, Splitting, Study, changed_scene
+from dsa_des.studies.splitting import Splitting
+from dsa_des.studies.study import MetricSpec, Study, changed_scene
 from dsa_des.studies.study_checks import check_cells
 from dsa_des.studies.study_tables import (
-    AXES_OF_FIGURES,
-    FIGURES,
     CompareTable,
-    FigureTable,
     RequirementTable,
     SplittingTable,
     StopWhenTable,
     StudyKeys,
+    read_figures,
     resolved,
 )
 
@@ -159,7 +158,13 @@ class _StudyReader:
             stop_when=stop_when,
             confidence=keys.confidence,
             interval=keys.interval,
-            figures=self.figures(axes, cells),
+            figures=read_figures(
+                file,
+                keys.figures,
+                axes,
+                {"cell": cells, "replica": keys.replicas},
+                lambda key, name: self.column(key, name, axes),
+            ),
             compare_weight=weight,
             requirements=self.requirements(axes),
             splitting=splitting,
@@ -299,39 +304,6 @@ class _StudyReader:
             self.file.report(("compare", "baseline"), message, wanted)
             return None, table.weight
         return (column, axis.labels[axis.labels.index(label)]), table.weight
-
-    def figures(self, axes: tuple[Axis, ...], cells: int) -> tuple[FigureRecord, ...]:
-        most = {"cell": cells, "replica": self.keys.replicas}
-        figures: list[FigureRecord] = []
-        for number, item in enumerate(self.keys.figures):
-            key: Key = ("figures", number)
-            figure = read_table(self.file, key, FigureTable, item)
-            if figure is None:
-                continue
-            kind, allowed = figure.kind, ("kind", "title", *FIGURES[figure.kind])
-            columns: dict[str, str] = {}
-            for name, value in item.items():
-                at = (*key, name)
-                if name not in allowed:
-                    hint = did_you_mean(name, allowed)
-                    self.file.report(at, f"unknown key of a {kind} figure{hint}")
-                elif name in AXES_OF_FIGURES:
-                    columns[name] = self.column(at, value, axes) or ""
-                elif name in most and value >= most[name]:
-                    message = f"must be the number of a {name} of this study: 0 to {most[name] - 1}"
-                    self.file.report(at, message, value)
-            if kind != "run" and figure.metric is None:
-                self.file.report(key, "needs a metric: the name of a result")
-            if kind in ("heat", "map") and len(axes) < 2:
-                what = "heat map" if kind == "heat" else "map"
-                self.file.report(key, f"a {what} needs two axes; the study has {len(axes)}")
-            chosen = [axis for axis in axes if columns.get("axis", axes[0].column) == axis.column]
-            if kind == "polar" and chosen and not chosen[0].numeric:
-                said = f"a polar figure needs an axis in degrees; {chosen[0].column} is no number"
-                self.file.report(key, said)
-            # What is wrong with it is reported, and then no study is made.
-            figures.append(figure.model_copy(update={"kind": kind, **columns}))
-        return tuple(figures)
 
     def requirements(self, axes: tuple[Axis, ...]) -> tuple[Requirement, ...]:
         requirements: list[Requirement] = []

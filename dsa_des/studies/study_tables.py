@@ -1,7 +1,7 @@
 """Tables of a study file: its keys, figures and requirements, and paths seen from anywhere."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -9,7 +9,12 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
 
 from dsa_des.block.component import SourcedText
+from dsa_des.errors import did_you_mean
 from dsa_des.results.record import FigureKind, FigureRecord, as_text
+from dsa_des.scene.checks import read_table
+from dsa_des.scene.keys import Key
+from dsa_des.scene.scene_file import SceneFile
+from dsa_des.studies.axes import Axis
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
 _NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when", "allocate",
@@ -159,13 +164,13 @@ def _several(limits: Any) -> Any:
 
 
 class FigureTable(FigureRecord):
-    """A figure as a study file states it; `FIGURES` has the keys of each kind."""
+    """A figure as a study file states it; `_KEYS_OF_FIGURES` has those of each kind."""
 
     kind: FigureKind = "axis"
     limits: Annotated[list[float], BeforeValidator(_several)] = Field(default=[], alias="limit")
 
 
-FIGURES = {
+_KEYS_OF_FIGURES = {
     "axis": ("metric", "axis", "lines"),
     "heat": ("metric", "x", "y"),
     "map": ("metric", "x", "y", "limit"),
@@ -175,7 +180,50 @@ FIGURES = {
     "series": ("metric", "freedom", "limit"),
     "run": ("cell", "replica"),
 }
-AXES_OF_FIGURES = ("axis", "lines", "x", "y")
+_AXES_OF_FIGURES = ("axis", "lines", "x", "y")
+
+
+def read_figures(
+    file: SceneFile,
+    tables: Sequence[Any],
+    axes: Sequence[Axis],
+    runs: Mapping[str, int],
+    column_of: Callable[[Key, Any], str | None],
+) -> tuple[FigureRecord, ...]:
+    """Return the figures of a study; what is wrong with them is reported.
+
+    `runs` says how many cells and replicas it has, and `column_of` which axis a name means.
+    """
+    figures: list[FigureRecord] = []
+    for number, item in enumerate(tables):
+        key: Key = ("figures", number)
+        figure = read_table(file, key, FigureTable, item)
+        if figure is None:
+            continue
+        kind, allowed = figure.kind, ("kind", "title", *_KEYS_OF_FIGURES[figure.kind])
+        columns: dict[str, str] = {}
+        for name, value in item.items():
+            at = (*key, name)
+            if name not in allowed:
+                hint = did_you_mean(name, allowed)
+                file.report(at, f"unknown key of a {kind} figure{hint}")
+            elif name in _AXES_OF_FIGURES:
+                columns[name] = column_of(at, value) or ""
+            elif name in runs and value >= runs[name]:
+                message = f"must be the number of a {name} of this study: 0 to {runs[name] - 1}"
+                file.report(at, message, value)
+        if kind != "run" and figure.metric is None:
+            file.report(key, "needs a metric: the name of a result")
+        if kind in ("heat", "map") and len(axes) < 2:
+            what = "heat map" if kind == "heat" else "map"
+            file.report(key, f"a {what} needs two axes; the study has {len(axes)}")
+        chosen = [axis for axis in axes if columns.get("axis", axes[0].column) == axis.column]
+        if kind == "polar" and chosen and not chosen[0].numeric:
+            said = f"a polar figure needs an axis in degrees; {chosen[0].column} is no number"
+            file.report(key, said)
+        # What is wrong with it is reported, and then no study is made.
+        figures.append(figure.model_copy(update={"kind": kind, **columns}))
+    return tuple(figures)
 
 
 class RequirementTable(StudyTable):

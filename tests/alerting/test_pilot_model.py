@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.operator.stochastic import Draws, mean_pause_s, pause_s, response_s, steering
+from components.operator.pilot_model import Draws, mean_pause_s, pause_s, response_s, steering
 
 EVEN = (np.arange(4000) + 0.5) / 4000
 DEG, FOOT_M = math.pi / 180, 0.3048

@@ -5,13 +5,14 @@
 
 A line is drawn first, all alike, of all rooms of `dsa_des` and `components`; then a kind of mistake
 that this line allows (a constant, a comparison, a sign, swapped arguments, a dropped term, one off,
-and for or, ...), then one of these. It is put into a copy of the project. The tests nearest to the
-line run first, then all others that execute it, the cheapest files first, until one fails or their
-time (`--budget-s`) is used up; what does not end counts as noticed.
+and for or, ...), then one of these. It is put into a copy of the project. The tests of its room run
+first, then those of rooms that import it, then all others that execute the line, the cheapest files
+first (`tests/run_nearest.py` knows the order), until one fails or their time (`--budget-s`) is used
+up; what does not end counts as noticed.
 
-Which tests execute a line is known from a map that `coverage_map.py` makes once (half an hour; a
-map of an older state still serves, as do the tests that it does not know). Without a map these are
-the tests in the room's folder and those that name the module, and any line may be drawn.
+Which tests execute a line is known from a map that `coverage_map.py` makes once (half an hour; of
+the fast tier, with -m "not slow", a few minutes; a map of an older state still serves, as do the
+tests that it does not know). Without a map all tests may, and any line may be drawn.
 
 While you strengthen the tests of a room:
 
@@ -27,7 +28,7 @@ import random
 import sys
 import tempfile
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from functools import cache, partial
@@ -39,17 +40,23 @@ from coverage_map import KEPT, Map
 from drawn_fault import DrawnFault, faults_of
 from faulty_copy import CAUGHT, ROOT, SURVIVED, TestRun, copies_in, tried
 
+sys.path.append(str(ROOT / "tests"))
+from run_nearest import REST, order_tests
+
 _EQUIVALENT = Path(__file__).with_name("equivalent.json")
-_NEAR_S, _NEAR_FILES = 10.0, 6
 
 
 class Chosen:
     """Pytest's plugin that keeps the tests that were chosen, and those that the map does not know.
 
-    Files stay together, for what their tests share; the cheapest come first.
+    Files keep their order, and are not mixed, for what their tests share; the cheapest of each come
+    first.
     """
 
-    def __init__(self, wanted: Iterable[str], known: dict[str, float]) -> None:
+    def __init__(
+        self, files: Sequence[str], wanted: Iterable[str], known: dict[str, float]
+    ) -> None:
+        self._place = {file: place for place, file in enumerate(files)}
         self._wanted, self._known = set(wanted), known
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
@@ -57,18 +64,16 @@ class Chosen:
         items[:] = [
             item for item in items if item.nodeid in self._wanted or item.nodeid not in self._known
         ]
-        seconds = {item.nodeid: self._known.get(item.nodeid, 1.0) for item in items}
-        of_file: Counter[str] = Counter()
-        for test, taken in seconds.items():
-            of_file[_file(test)] += taken
-        items.sort(key=lambda item: (of_file[_file(item.nodeid)], seconds[item.nodeid]))
+        items.sort(
+            key=lambda item: (self._place[_file(item.nodeid)], self._known.get(item.nodeid, 1.0))
+        )
 
 
 class Tests:
-    """Which tests are to notice a fault, in two rounds."""
+    """Which tests are to notice a fault: its room's, those of rooms above it, and the rest."""
 
-    def __init__(self, known: Map, budget_s: float) -> None:
-        self._known, self._budget_s = known, budget_s
+    def __init__(self, known: Map, budget_s: float, tier: str) -> None:
+        self._known, self._budget_s, self._tier = known, budget_s, tier
         self._lines = cache(lambda file, text: known.executed(file, text))
 
     def reaches(self, fault: DrawnFault) -> bool:
@@ -80,23 +85,24 @@ class Tests:
         lines = self._lines(fault.file, fault.text)
         # What is executed where the module is imported concerns all that execute the rest of it.
         tests = lines.get(fault.line) or {test for each in lines.values() for test in each}
-        own = f"tests/{fault.room.rpartition('/')[2]}/"
+        near = order_tests([fault.file])
+        slow = {line.partition("::")[0] for line in _slow_lines()} if self._tier else set()
         of_file = defaultdict(list)
         for test in tests:
             of_file[_file(test)].append(test)
-        cost = {file: sum(map(self._seconds, mine)) for file, mine in of_file.items()}
-        files = sorted(of_file, key=lambda file: (not file.startswith(own), cost[file]))
-        near, rest, spent_s = [], [], 0.0
-        for file in files:
-            close = len(near) < _NEAR_FILES and (cost[file] <= _NEAR_S or not near)
-            if spent_s + cost[file] <= self._budget_s or not near:
-                (near if close else rest).append(file)
+        known = {_file(test) for test in self._known.seconds} | slow
+        cost = {file: sum(map(self._seconds, of_file.get(file, ()))) for file in near}
+        rounds: list[list[str]] = [[], [], []]
+        spent_s = 0.0
+        for file in sorted(near, key=lambda file: (near[file][0], cost[file], near[file][1])):
+            # Of what the map does not know only those run that are likely to notice it.
+            wanted = file in of_file or (file not in known and (near[file][0] < REST or not known))
+            if wanted and (spent_s + cost[file] <= self._budget_s or not spent_s):
+                rounds[near[file][0]].append(file)
                 spent_s += cost[file]
-        known = {_file(test) for test in self._known.seconds}
-        rest += [file for file in _naming(fault) if file not in of_file and file not in known]
         return [
             partial(self._start, files=some, tests=[t for file in some for t in of_file[file]])
-            for some in (near, rest if near or rest else ["tests"])
+            for some in rounds
             if some
         ]
 
@@ -105,31 +111,18 @@ class Tests:
 
     def _start(self, folder: Path, files: Sequence[str], tests: Sequence[str]) -> TestRun:
         there = [file for file in files if (folder / file).exists()]
-        limit_s = 300.0 + 10.0 * sum(map(self._seconds, tests))
-        chosen = Chosen(tests, self._known.seconds)
-        return TestRun(folder, there, "-x", limit_s=limit_s, plugins=[chosen])
+        limit_s = 120.0 + 5.0 * sum(map(self._seconds, tests))
+        chosen = Chosen(files, tests, self._known.seconds)
+        options = ["-x", *(["-m", self._tier] if self._tier else [])]
+        return TestRun(folder, there, *options, limit_s=limit_s, plugins=[chosen])
 
 
 def _file(test: str) -> str:
     return test.partition("::")[0]
 
 
-@cache
-def _texts_of_tests() -> dict[str, str]:
-    return {
-        path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
-        for path in sorted((ROOT / "tests").rglob("test_*.py"))
-    }
-
-
-def _naming(fault: DrawnFault) -> Iterator[str]:
-    """Yield test files in the folder of the room's name, and those that name the module."""
-    package, _, module = fault.file.removesuffix(".py").replace("/", ".").rpartition(".")
-    room = f"tests/{fault.room.rpartition('/')[2]}/"
-    for file, text in _texts_of_tests().items():
-        named = f"from {package} import" in text and f" {module}" in text
-        if named or file.startswith(room) or f"{package}.{module}" in text:
-            yield file
+def _slow_lines() -> list[str]:
+    return (ROOT / "tests/slow.txt").read_text(encoding="utf-8").splitlines()
 
 
 def drawn(seed: int, count: int, only: Sequence[str], tests: Tests) -> list[DrawnFault]:
@@ -177,7 +170,7 @@ def equivalents(marked: Sequence[dict] | None = None) -> dict[str, str]:
 def main() -> int:
     """Draw, try and tell; 1 if a fault that is not called equivalent survived."""
     asked = _arguments()
-    tests = Tests(Map(asked.map), asked.budget_s)
+    tests = Tests(Map(asked.map), asked.budget_s, "not slow" if asked.fast else "")
     rows = _earlier(asked.json)
     if asked.survivors:
         wanted = {row["digest"] for row in rows if row["result"] == SURVIVED}
@@ -247,6 +240,7 @@ def _arguments() -> Namespace:
     add("--json", type=Path, metavar="FILE", help="add the outcomes to a file")
     add("--survivors", action="store_true", help="only those that survived in the --json file")
     add("--map", type=Path, default=KEPT, metavar="FILE", help=f"of coverage_map; default: {KEPT}")
+    add("--fast", action="store_true", help="try the fast tier of tests alone")
     add("--budget-s", type=float, default=90.0, help="of tests for one fault; default: 90")
     add("--page", type=Path, metavar="FILE", help="renew the table in this page of the docs")
     add("--unchecked", action="store_true", help="believe tests that noticed something")

@@ -10,7 +10,7 @@ from scipy import stats
 from test_avoidance_by_bands import scene as by_bands
 from wired import rows, run
 
-from components.operator.stochastic import CLIMB, TURN, Draws, response_s, steering
+from components.operator.pilot_model import CLIMB, TURN, Draws, response_s, steering
 from dsa_des import load_scene
 from dsa_des.errors import SceneError
 

@@ -245,7 +245,7 @@ def test_who_finds_no_way_out_is_counted(pilot: str, tmp_path: Path) -> None:
 
 def test_tries_of_runs_add_up_whatever_comes_when() -> None:
     tries = Tries().with_more(np.array([0, 2, 2]), np.array([1, 1, 2]), np.array([False] * 3))
-    tries = tries.with_more(np.array([4, 0]), np.array([3, 1]), np.array([True, False]))
+    tries = tries.with_more(np.array([4, 4, 0]), np.array([1, 2, 1]), np.arange(3) == 1)
     # Run 2, of 2 and 4; 0 and 2, of 0, 2 and 4.
     assert tries.undone("x", of_two=True)["x"].tolist() == [[0, 0, 1, 0, 0], [0, 0, 1, 0, 1]]
     assert tries.undone("x")["x"].tolist() == [[1, 0, 1, 0, 0], [1, 0, 1, 0, 1]]

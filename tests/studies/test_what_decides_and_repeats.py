@@ -9,9 +9,10 @@ import pyarrow as pa
 import pytest
 
 import dsa_des
+from dsa_des.costs import models
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.ratio import paired_ratio
-from dsa_des.studies import models, runner
+from dsa_des.studies import runner
 from tests.results.test_ratios import ratio
 
 ROOT = Path(__file__).parents[2]

@@ -1,4 +1,4 @@
-"""The models of a study's scene and their errors, kept beside its results."""
+"""The models that a scene is made of, and their errors beside each one's reference."""
 
 import json
 import math
@@ -10,52 +10,22 @@ from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.costs.climb import RungCost, applies, climb
 from dsa_des.costs.replay import run_watched
 from dsa_des.costs.variants import Choice, Variants
-from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.files.toml_files import to_toml
-from dsa_des.replicas.changed_scene import scene_of
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.labels import short
 from dsa_des.results.models import (
     ERRORS,
-    EXPLAINED,
     EffectRecord,
     ErrorRecord,
-    Explained,
     MeasuredErrors,
     ModelRecord,
     SceneRecord,
-    read_explained,
-    versions,
 )
 from dsa_des.results.rows import StoredRows
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.study import Study
-from dsa_des.studies.study_checks import one_per_value
-
-#: Cells that are looked at: the first, and one for each value of an axis.
-_MOST_CELLS = 12
 
 
-def explained(study: Study) -> Explained:
-    """Return of what a study's runs are made."""
-    scenes: list[SceneRecord] = []
-    text = ""
-    for cell in one_per_value(study)[:_MOST_CELLS]:
-        labels = study.labels(cell)
-        where = ", ".join(f"{name} = {short(value)}" for name, value in labels.items())
-        try:
-            scene = scene_of(study.scene(cell), study.replica(0, cell))
-            record = _of_scene(where, scene)
-            text = text or to_toml(scene.resolved())
-        except (SceneError, BlockFailure, ValueError):
-            continue  # its rows say why
-        scenes.append(_less(record, scenes[0]) if scenes else record)
-    scenes = [one for one in scenes if one.models or one.effects or one.spared]
-    return Explained(versions=versions(), scene=text, scenes=scenes)
-
-
-def _of_scene(where: str, scene: Scene) -> SceneRecord:
+def scene_record(where: str, scene: Scene) -> SceneRecord:
+    """Return which models and effects a scene has, and what they leave out."""
     simulation = Simulation(scene)
     models, spared = [], []
     for name, component in simulation.components.items():
@@ -99,21 +69,6 @@ def _rung(scene: Scene, name: str, ladder: Ladder) -> str:
             if changes or rung.type_name or rung.sections:
                 return best
     return best
-
-
-def _less(result: SceneRecord, first: SceneRecord) -> SceneRecord:
-    """Return what is not so in the first scene."""
-    lists = ("models", "effects", "spared")
-    new = {n: [one for one in getattr(result, n) if one not in getattr(first, n)] for n in lists}
-    return result.model_copy(update=new)
-
-
-def keep_explained(study: Study, folder: StudyFolder) -> None:
-    """Write ``explained.json`` into a study's folder, unless it is there."""
-    if read_explained(folder) is None:
-        content = explained(study).model_dump()
-        text = json.dumps(content, indent=1, allow_nan=False) + "\n"
-        folder.write_file(EXPLAINED, text.encode())
 
 
 def measure_errors(folder: StudyFolder, report: Callable[[str], None] = lambda text: None) -> None:
