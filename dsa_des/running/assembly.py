@@ -110,7 +110,7 @@ class Assembly:
         return longest
 
     def _refuse_late_changes(self) -> None:
-        for stretch in self._scene.stretches:
+        for stretch in self._scene.stretches if self._scene.duration_s is None else ():
             if stretch.from_s > self.duration_s:
                 ends_s = f"the run's end, {float(self.duration_s):g} s"
                 message = f"something changes at {float(stretch.from_s):g} s, beyond {ends_s}"

@@ -230,10 +230,17 @@ def stretches_of(
 
     `check` makes a scene of tables; what is wrong with one of them is reported at its change.
     """
-    _refuse_late(scene_file, scene.duration_s, changes)
+    _judge_late(scene_file, scene.duration_s, changes, scene.notes)
     if scene_file.problems:
         return []
-    instants = sorted({t for c in changes for t in (c.from_s, c.to_s) if t is not None})
+    instants = sorted(
+        {
+            instant
+            for change in changes
+            for instant in (change.from_s, change.to_s)
+            if instant is not None and (scene.duration_s is None or instant < scene.duration_s)
+        }
+    )
     stretches: list[Stretch] = []
     before = scene
     for instant in instants:
@@ -254,9 +261,13 @@ def stretches_of(
     return stretches
 
 
-def _refuse_late(
-    scene_file: SceneFile, duration_s: Fraction | None, changes: list[TimedChange]
+def _judge_late(
+    scene_file: SceneFile,
+    duration_s: Fraction | None,
+    changes: list[TimedChange],
+    notes: list[str],
 ) -> None:
+    """Report changes beyond the end of a run of the same file, and note those of a shorter one."""
     if duration_s is None:
         return
     for change in changes:
@@ -266,7 +277,10 @@ def _refuse_late(
         for key in late:
             at: Key = (CHANGES, change.number, key)
             message = f"is beyond the run's end, {float(duration_s):g} s"
-            scene_file.report(at, message, scene_file.data[CHANGES][change.number][key])
+            if scene_file.source_of(at) == scene_file.source_of(("duration_s",)):
+                scene_file.report(at, message, scene_file.data[CHANGES][change.number][key])
+            elif key == first:
+                notes.append(f"{dotted(at)} is {float(change.from_s):g}: it {message}")
 
 
 def _in_force(changes: list[TimedChange], instant: Fraction) -> Iterator[TimedChange]:
