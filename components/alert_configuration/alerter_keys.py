@@ -147,12 +147,18 @@ class AlerterKeys:
         number, _, text = self._lines[key]
         class_name = text.rpartition(".")[2]
         allowed = (*CLASSES, CYLINDER_CLASS, TCAS_CLASS)
-        if text not in {CLASS_PREFIX + known for known in allowed}:
+        wrong = text not in {CLASS_PREFIX + known for known in allowed}
+        if wrong:
             self._problems.add(
                 f"{self._lines[key][1]} is {shortened(text, 80)!r}: it must be {CLASS_PREFIX} and "
                 f"one of {', '.join(allowed)}{did_you_mean(class_name, allowed)}",
                 line=number,
             )
+            # Its sizes are those of the class that is meant; of none there is nothing to say.
+            class_name = nearest(class_name, allowed) or ""
+        if not class_name:
+            self._used |= {k for k in self._lines if k.startswith(begin)}
+            return None
         if class_name == TCAS_CLASS:
             advisory = self._advisory(f"{name}_{detector}", begin, number)
             return None if advisory is None else (advisory, False)
@@ -163,7 +169,7 @@ class AlerterKeys:
             )
             for size, kind in keys.items()
         }
-        if class_name not in allowed or any(sizes[s] is None for s in keys if s != "WCV_TCOA"):
+        if wrong or any(sizes[s] is None for s in keys if s != "WCV_TCOA"):
             return None
         for size in list(keys)[:2]:
             if sizes[size] == 0.0:

@@ -14,14 +14,10 @@ import numpy as np
 
 from dsa_des.answers.alternatives import AS_IT_IS, COLUMN
 from dsa_des.arrays.types import AnyArray, IntArray
+from dsa_des.results.differences import EstimatedDifference, difference, quantile_difference
 from dsa_des.results.record import EVENT, RATIO, SHARE, TRIALS, Result
 from dsa_des.results.rows import Rows, paired
-from dsa_des.results.statistics import (
-    Estimate,
-    EstimatedDifference,
-    difference,
-    quantile_difference,
-)
+from dsa_des.results.statistics import Estimate
 
 #: Events that a ratio without a word of caution rests on, on either side.
 FEW_EVENTS = 20

@@ -26,13 +26,12 @@ from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import new_folder
 from dsa_des.results.curves import draw_scatter
+from dsa_des.results.differences import changes_of, difference, paired_units
 from dsa_des.results.figures import safe_name
 from dsa_des.results.folder import STUDY_JSON, StudyFolder
 from dsa_des.results.labels import short
 from dsa_des.results.printing import rounded
 from dsa_des.results.record import StudyRecord
-from dsa_des.results.rows import paired_units
-from dsa_des.results.statistics import changes_of, difference
 from dsa_des.results.tables import Tables
 from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.scene import load_scene

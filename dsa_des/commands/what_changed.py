@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.results.differences import changes_of
 from dsa_des.results.labels import short, unit_of
 from dsa_des.results.record import EVENT, Result
-from dsa_des.results.statistics import changes_of
 from dsa_des.results.tables import Tables
 from dsa_des.terminal.terminal import console, say
 from dsa_des.text.safe_text import printable, shortened

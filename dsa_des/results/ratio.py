@@ -10,7 +10,7 @@ is that of a ratio of dependent sums (W. G. Cochran, "Sampling techniques", 3rd 
 chapter 6): with residuals w (m - R n) its variance is Σ w² (m - R n)² / (Σ w n)². Taking the
 denominator as known, as the usual tools do, is another number: `PairedRatio.unpaired_error`.
 
-The interval is made for few events of uneven weights (`gamma`, `gamma_interval.py`).
+The interval is made for few events of uneven weights (`gamma`: `statistics.gamma_interval`).
 
 Runs that hang together (several of one encounter, or copies of it) are one *cluster*: their terms
 are added up first, and clusters are what is independent.
@@ -32,8 +32,7 @@ import numpy.typing as npt
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.errors import shown_value
-from dsa_des.results.gamma_interval import gamma_interval, unseen_event
-from dsa_des.results.statistics import scaled
+from dsa_des.results.statistics import gamma_interval, scaled, unseen_event
 
 #: Intervals: by gamma distributions, of the logarithm of the ratio by its standard error, or of
 #: drawn sets of encounters.

@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.results.folder import StudyFolder
-from dsa_des.results.ratio import (
-    PairedRatio,
-    influences,
-    paired_ratio,
-    taken_over,
-    unseen_variance,
+from dsa_des.results.differences import (
+    EstimatedDifference,
+    RatioTerms,
+    estimate_of,
+    paired_units,
+    ratio_difference,
 )
+from dsa_des.results.folder import StudyFolder
+from dsa_des.results.ratio import PairedRatio, paired_ratio, taken_over
 from dsa_des.results.record import (
     CRASHED,
     EVENT,
@@ -34,14 +35,11 @@ from dsa_des.results.record import (
 )
 from dsa_des.results.statistics import (
     Estimate,
-    EstimatedDifference,
     fraction,
     mean,
-    normal_error,
     quantile,
     rare,
     share,
-    symmetric,
 )
 
 if TYPE_CHECKING:
@@ -156,10 +154,6 @@ def _joined(pieces: list[Any]) -> AnyArray:
     texts = np.array([*whole.dictionary.to_pylist(), None], dtype=object)
     joined: AnyArray = texts[whole.indices.fill_null(len(texts) - 1).to_numpy()]
     return joined
-
-
-#: Below and above the line, weight, cluster, and for how many each stands.
-_Paired = tuple[FloatArray, FloatArray, FloatArray, AnyArray, FloatArray | None]
 
 
 class Rows:
@@ -299,8 +293,8 @@ class Rows:
 
         Runs of the same encounter, and of the same unit, hang together.
         """
-        matches, used, missing = self._paired(result, rows)
-        below, above, weight, cluster, stands_for = matches
+        terms, used, missing = self._paired(result, rows)
+        below, above, weight, cluster, stands_for = terms
         method = "bootstrap" if method == "bootstrap" else "gamma"
         together = cluster if len(np.unique(cluster)) < len(used) else None
         ratio = paired_ratio(
@@ -312,7 +306,7 @@ class Rows:
             ratio = replace(ratio, interval=(low, min(high, 1.0)))
         return ratio, missing
 
-    def _paired(self, result: Result, rows: IntArray) -> tuple["_Paired", IntArray, int]:
+    def _paired(self, result: Result, rows: IntArray) -> tuple[RatioTerms, IntArray, int]:
         """Return the columns of a ratio over the rows that have all of them, and those rows."""
         of = result.ratio
         assert of is not None
@@ -332,57 +326,17 @@ class Rows:
             if self.over:  # one encounter's number means another in another file
                 _, number = np.unique(cluster, return_inverse=True)
                 cluster = units * (int(number.max(initial=0)) + 1) + number
-        some = None if stands_for is None else stands_for[known]
-        columns = below[known], above[known], weight[known], cluster[known], some
-        return columns, rows[known], int((~known).sum())
+        terms = RatioTerms(below, above, weight, cluster, stands_for).of(known)
+        return terms, rows[known], int((~known).sum())
 
     def ratio_difference(
         self, result: Result, first: IntArray, second: IntArray, confidence: float
     ) -> EstimatedDifference:
-        """Return how a ratio differs between two conditions on the same runs, by their influences.
-
-        What each run adds to the error of either ratio is subtracted run by run, so what they
-        share falls out; the interval is that of the normal distribution. Its variance holds one
-        run more that gains the event and one that loses it, of the weight of those below the line:
-        as Bonett and Price do for events without weights (`statistics.difference`), so that runs
-        which all agree still leave as much open as so many can.
-        """
-        sides = [self._paired(result, rows) for rows in (first, second)]
-        one, two = (self.runs[side[1]] for side in sides)
-        _, here, there = np.intersect1d(one, two, return_indices=True)
-        parts, ratios, cluster = [], [], sides[0][0][3][here]
-        for (columns, _, _), common in zip(sides, (here, there), strict=True):
-            below, above, weight = (column[common] for column in columns[:3])
-            some = None if columns[4] is None else columns[4][common]
-            ratio = paired_ratio(
-                below, above, weight, cluster=cluster, stands_for=some, confidence=confidence,
-                method="delta",
-            )  # fmt: skip
-            ratios.append(ratio)
-            if not ratio.reason:
-                parts.append(influences(below, above, weight, ratio.ratio, some))
-        alone = [len(side[1]) - len(here) for side in sides]
-        if len(parts) < 2:
-            none = Estimate(np.nan, np.nan, np.nan, 0, True)
-            return EstimatedDifference(none, none, *alone)
-        _, index = np.unique(cluster, return_inverse=True)
-        each = np.array([np.bincount(index, weights=part) for part in parts])
-        value, few = ratios[1].ratio - ratios[0].ratio, any(ratio.few for ratio in ratios)
-        events = np.bincount(index, weights=weight * below).astype(float)
-        more = 2.0 * unseen_variance(events)
-        joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + more))
-        # A ratio whose runs all agree has no such error; its interval tells another.
-        alike = sum(
-            normal_error(estimate_of(ratio), confidence) ** 2
-            for ratio, part in zip(ratios, each, strict=True)
-            if np.abs(part).max() < 1e-12
-        )
-        apart = float(np.sqrt((each**2).sum() + alike + more))
-        return EstimatedDifference(
-            symmetric(value, joint, each.shape[1], few, confidence),
-            symmetric(value, apart, each.shape[1], few, confidence),
-            *alone,
-        )
+        """Return how a ratio differs between two conditions on the runs that both have."""
+        (one, mine, _), (two, other, _) = (self._paired(result, rows) for rows in (first, second))
+        _, here, there = np.intersect1d(self.runs[mine], self.runs[other], return_indices=True)
+        alone = len(mine) - len(here), len(other) - len(there)
+        return ratio_difference(one.of(here), two.of(there), alone, confidence)
 
     def event_ratio(
         self, name: str, first: IntArray, second: IntArray, weight: str | None, confidence: float
@@ -415,11 +369,6 @@ class Rows:
         return tuple(sorted(Counter(said).items()))
 
 
-def estimate_of(ratio: PairedRatio) -> Estimate:
-    """Return a ratio as the summary's other lines are."""
-    return Estimate(ratio.ratio, *ratio.interval, ratio.clusters, ratio.few)
-
-
 def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
 
@@ -432,30 +381,3 @@ def paired(
     _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
     one, two = first[here], second[there]
     return paired_units(rows.units[one], values[one].astype(float), values[two].astype(float))
-
-
-def paired_units(
-    units: IntArray, first: FloatArray, second: FloatArray
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return units, and each one's mean value in two conditions, over runs that have both.
-
-    Of a unit without such a run one condition keeps its mean, and the other has no value: runs
-    with a value on one side only would compare other draws.
-
-    A run without a value has NaN.
-    """
-    result, index = np.unique(units, return_inverse=True)
-
-    def means(values: FloatArray, used: AnyArray) -> FloatArray:
-        many = np.bincount(index[used], minlength=len(result))
-        total = np.bincount(index[used], weights=values[used], minlength=len(result))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.where(many > 0, total / many, np.nan)
-
-    here, there = ~np.isnan(first), ~np.isnan(second)
-    one, two = means(first, here & there), means(second, here & there)
-    without = np.isnan(one)
-    alone = np.where(without, means(first, here), np.nan)
-    one = np.where(without, alone, one)
-    two = np.where(without & np.isnan(alone), means(second, there), two)
-    return result, one, two

@@ -1,6 +1,7 @@
-"""Confidence intervals: Wilson for shares, t or bootstrap for means, paired for differences."""
+"""Confidence intervals: Wilson for shares, t or bootstrap for means, gamma for ratios of counts."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 
@@ -14,8 +15,6 @@ FEW = 10
 #: trials that hang together says little.
 FEW_UNLIKE = 5
 _RESAMPLES = 2000
-#: Of the largest of some values: a smaller difference is one of rounding.
-_ALIKE = 1e-9
 #: No interval of a logarithm is wider.
 _MOST_LOG = 700.0
 
@@ -47,19 +46,6 @@ def within(result: Estimate, least: float | None, most: float | None) -> Estimat
     return replace(result, low=low, high=high) if result.low <= result.high else result
 
 
-def changes_of(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return second minus first; 0 where the two are alike but for how they were rounded.
-
-    That is, within 1e-9 of the largest of them: a quantity is never known so well, and rounding
-    adds up to far less.
-    """
-    changes = second - first
-    both = np.abs(np.concatenate([first, second]))
-    finite = both[np.isfinite(both)]
-    resolution = _ALIKE * float(finite.max(initial=0.0))
-    return np.where(np.abs(changes) <= resolution, 0.0, changes)
-
-
 def wilson(successes: float, trials: float, confidence: float) -> tuple[float, float]:
     """Return Wilson's score interval of a share.
 
@@ -71,7 +57,7 @@ def wilson(successes: float, trials: float, confidence: float) -> tuple[float, f
     """
     if trials <= 0:
         return math.nan, math.nan
-    z = _z(confidence)
+    z = normal_quantile(confidence)
     share = successes / trials
     middle = (share + z * z / (2.0 * trials)) / (1.0 + z * z / trials)
     spread = share * (1.0 - share) / trials + z * z / (4.0 * trials * trials)
@@ -81,7 +67,7 @@ def wilson(successes: float, trials: float, confidence: float) -> tuple[float, f
     return low, high
 
 
-def _z(confidence: float) -> float:
+def normal_quantile(confidence: float) -> float:
     """Return the two-sided quantile of the normal distribution."""
     return NormalDist().inv_cdf(0.5 + confidence / 2.0)
 
@@ -112,7 +98,7 @@ def share(successes: FloatArray, trials: FloatArray, confidence: float) -> Estim
         residuals = successes - value * trials
         spread = units / (units - 1) * math.fsum(residuals**2) / total**2
         if clustered:
-            spread *= (t_quantile(units - 1, confidence) / _z(confidence)) ** 2
+            spread *= (t_quantile(units - 1, confidence) / normal_quantile(confidence)) ** 2
         effective = total / max(1.0, spread / plain)
     elif clustered:
         effective = float(units)
@@ -210,13 +196,13 @@ def fraction(values: FloatArray, confidence: float) -> Estimate:
 
 def symmetric(value: float, error: float, count: int, few: bool, confidence: float) -> Estimate:
     """Return an estimate whose interval is that of the normal distribution."""
-    half = _z(confidence) * error
+    half = normal_quantile(confidence) * error
     return Estimate(value, value - half, value + half, count, few)
 
 
 def normal_error(estimate: Estimate, confidence: float) -> float:
     """Return the standard error whose normal interval is as wide as an estimate's."""
-    return estimate.half_width / _z(confidence)
+    return estimate.half_width / normal_quantile(confidence)
 
 
 def standard_error(values: FloatArray) -> float:
@@ -269,144 +255,6 @@ def _bootstrap(values: FloatArray, confidence: float) -> tuple[float, float] | N
     return float(high), -float(low)
 
 
-@dataclass(frozen=True)
-class EstimatedDifference:
-    """How two conditions differ on the same units."""
-
-    #: Mean of the differences, unit by unit.
-    paired: Estimate
-    #: The same mean with the interval it would have on independent units (Welch).
-    unpaired: Estimate
-    #: Units that have a value in one condition only; they are in neither estimate.
-    only_first: int
-    only_second: int
-
-    @property
-    def narrower(self) -> float:
-        """How many times narrower the paired interval is; infinite where nothing differs."""
-        if self.paired.half_width == 0.0:
-            return math.inf if self.unpaired.half_width > 0.0 else math.nan
-        return self.unpaired.half_width / self.paired.half_width
-
-
-def difference(
-    first: FloatArray,
-    second: FloatArray,
-    confidence: float,
-    method: str = "t",
-    *,
-    kind: str = "number",
-) -> EstimatedDifference:
-    """Return second minus first on common units.
-
-    NaN is a unit without a value. Of all kinds but numbers no interval reaches beyond -1 and 1.
-    Events, and shares of which each unit has all or nothing, are counted: their paired interval is
-    that of Bonett and Price, "Adjusted Wald confidence interval for a difference of binomial
-    proportions based on paired data", Journal of Educational and Behavioral Statistics 37 (2012);
-    the unpaired one is that of Agresti and Caffo, "Simple and effective confidence intervals for
-    proportions and differences of proportions", The American Statistician 54 (2000). Neither is a
-    point where no unit differs.
-    """
-    here, there = ~np.isnan(first), ~np.isnan(second)
-    both = here & there
-    changes = changes_of(first[both], second[both])
-    whole = kind == "share" and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
-    counted = len(changes) > 1 and (kind == "event" or whole)
-    paired = _counted(changes, confidence) if counted else mean(changes, confidence, method)
-    apart = counted and bool(np.isin((first[both], second[both]), (0.0, 1.0)).all())
-    if apart:
-        unpaired = _counted_apart(first[both], second[both], confidence)
-    else:
-        unpaired = _welch(first[both], changes, confidence)
-    if kind != "number":
-        paired, unpaired = _of_shares(paired), _of_shares(unpaired)
-    return EstimatedDifference(
-        paired,
-        unpaired,
-        int((here & ~there).sum()),
-        int((there & ~here).sum()),
-    )
-
-
-def quantile_difference(
-    first: FloatArray, second: FloatArray, share: float, confidence: float
-) -> EstimatedDifference:
-    """Return how a quantile over the same units differs between two conditions.
-
-    The interval is the normal distribution's with the spread of 1000 resamples of the units, always
-    the same ones, each with its values under both conditions (Efron and Tibshirani, chapter 8.6).
-    NaN is a unit without a value. Where a quantile has no interval of its own, this has none.
-    """
-    here, there = ~np.isnan(first), ~np.isnan(second)
-    one, two = first[here & there], second[here & there]
-    alone = int((here & ~there).sum()), int((there & ~here).sum())
-    ends = [quantile(values, share, confidence) for values in (one, two)]
-    value = ends[1].value - ends[0].value
-    if any(end.few for end in ends):
-        none = Estimate(value, math.nan, math.nan, len(one), True)
-        return EstimatedDifference(none, none, *alone)
-    index = max(0, math.ceil(share * len(one) - 1e-9) - 1)
-    generator = np.random.Generator(np.random.Philox(len(one)))
-    drawn = np.empty(_RESAMPLES // 2)
-    for k in range(len(drawn)):
-        units = generator.integers(0, len(one), len(one))
-        low, high = (np.partition(values[units], index)[index] for values in (one, two))
-        drawn[k] = high - low
-    apart = math.hypot(*(normal_error(end, confidence) for end in ends))
-    return EstimatedDifference(
-        symmetric(value, float(drawn.std(ddof=1)), len(one), False, confidence),
-        symmetric(value, apart, len(one), False, confidence),
-        *alone,
-    )
-
-
-def _of_shares(result: Estimate) -> Estimate:
-    """Return a difference of shares whose interval holds nothing that none can be."""
-    return within(result, -1.0, 1.0)
-
-
-def _counted(changes: FloatArray, confidence: float) -> Estimate:
-    """Return the mean of changes of events, as if one unit more had gained and one more had lost.
-
-    Units of several runs differ by parts of an event: there the two lie the smallest part that is
-    seen to either side of the mean.
-    """
-    count = len(changes)
-    value = math.fsum(changes) / count
-    sizes = np.abs(changes)
-    step = float(sizes[sizes > 1e-9].min(initial=1.0))
-    about = 0.0 if step == 1.0 else value
-    more = np.append(changes, [about - step, about + step])
-    middle = math.fsum(more) / len(more)
-    error = math.sqrt(math.fsum((more - middle) ** 2)) / len(more)
-    half = t_quantile(count - 1, confidence) * error
-    return Estimate(value, middle - half, middle + half, count, count < FEW)
-
-
-def _counted_apart(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:
-    """Return the difference of two shares, each as if of one unit more of either kind."""
-    count = len(first)
-    one, other = ((result.sum() + 1.0) / (count + 2.0) for result in (first, second))
-    error = math.sqrt((one * (1.0 - one) + other * (1.0 - other)) / (count + 2.0))
-    half = _z(confidence) * error
-    value, middle = float(second.mean() - first.mean()), float(other - one)
-    return Estimate(value, middle - half, middle + half, count, count < FEW)
-
-
-def _welch(first: FloatArray, changes: FloatArray, confidence: float) -> Estimate:
-    count = len(first)
-    if count < 2:
-        return Estimate(math.nan, math.nan, math.nan, count, True)
-    value = mean(changes, confidence).value
-    errors, exponent = scaled(np.array([standard_error(first), standard_error(first + changes)]))
-    one, other = (errors**2).tolist()
-    if one + other == 0.0:
-        return Estimate(value, value, value, count, count < FEW)
-    degrees = (one + other) ** 2 * (count - 1) / (one**2 + other**2)
-    half = t_quantile(degrees, confidence) * math.ldexp(math.sqrt(one + other), exponent)
-    return Estimate(value, value - half, value + half, count, count < FEW)
-
-
 def chi_square_bounds(freedom: float, share: float = 0.95) -> tuple[float, float]:
     """Return the interval that holds a chi-square variable with a probability, tails alike."""
     from scipy.special import gammaincinv
@@ -414,3 +262,92 @@ def chi_square_bounds(freedom: float, share: float = 0.95) -> tuple[float, float
     tail = 0.5 * (1.0 - share)
     low, high = (2.0 * float(gammaincinv(0.5 * freedom, p)) for p in (tail, 1.0 - tail))
     return low, high
+
+
+def unseen_event(terms: FloatArray) -> tuple[float, float]:
+    """Return what one event more adds to a weighted sum, on average, and to its variance."""
+    once = math.fsum(terms)
+    return math.fsum(terms**2) / once, math.fsum(terms**3) / once
+
+
+def gamma_interval(
+    below: FloatArray, above: FloatArray, ratio: float, tail: float
+) -> tuple[float, float]:
+    """Return the ends of an interval of which either errs with a probability of at most `tail`.
+
+    `below` and `above` are the clusters' terms below and above the line.
+
+    Made for few events of uneven weights. That R is below some R0 means that the terms y - R0 x,
+    which are positive for a risk that stays and negative for one that went, sum to less than
+    nothing. Either sum is one of independent weighted Poisson counts, whose interval is a gamma
+    distribution's with the sum's mean and variance, and on the side that must be certain those of
+    one event more (M. P. Fay and E. J. Feuer, "Confidence intervals for directly standardized
+    rates", Statistics in Medicine 16, 1997; for a ratio of two, M. P. Fay, Communications in
+    Statistics 28, 1999). That event is one that nobody has seen. Above the line it weighs what
+    those seen do, drawn in proportion to their weights, for that is how one enters the sum; on the
+    other side as much as the heaviest nominal one. With equal weights and nothing induced the lower
+    end is Clopper and Pearson's; the upper lies a little above theirs, because the event more may
+    be an induced one.
+    """
+    # In order of above/below, the terms y - R x that are negative are the first ones, for any R.
+    some = (below > 0.0) | (above > 0.0)
+    x, y = below[some], above[some]
+    with np.errstate(divide="ignore"):
+        each = y / x
+    order = np.argsort(each, kind="stable")
+    each, x, y = each[order], x[order], y[order]
+    moments = np.stack([x, y, x * x, x * y, y * y])
+    first = np.concatenate([np.zeros((5, 1)), np.cumsum(moments, axis=1)], axis=1)
+    last = np.concatenate([np.cumsum(moments[:, ::-1], axis=1)[:, ::-1], np.zeros((5, 1))], axis=1)
+
+    def sums(limit: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return the terms that went and those that stay: their sums and their squares'."""
+        index = int(np.searchsorted(each, limit))
+        went, stay = (part[:, index].tolist() for part in (first, last))
+        return (
+            (limit * went[0] - went[1], limit**2 * went[2] - 2.0 * limit * went[3] + went[4]),
+            (stay[1] - limit * stay[0], limit**2 * stay[2] - 2.0 * limit * stay[3] + stay[4]),
+        )
+
+    more, heaviest = unseen_event(np.maximum(x, y)), float(x.max())
+
+    def below_it(limit: float) -> float:
+        """Return how sure it is that the ratio is below a limit."""
+        went, stay = sums(limit)
+        return _surely_more(went, (stay[0] + more[0], stay[1] + more[1]))
+
+    def above_it(limit: float) -> float:
+        went, stay = sums(limit)
+        had = limit * heaviest
+        return _surely_more(stay, (went[0] + had, went[1] + had * had))
+
+    sure = 1.0 - tail
+    low = 0.0 if ratio == 0.0 else _where(above_it, sure, ratio, 0.5)
+    return low, _where(below_it, sure, ratio or 1.0 / len(x), 2.0)
+
+
+def _surely_more(one: tuple[float, float], other: tuple[float, float]) -> float:
+    """Return the probability that a gamma variable is larger than another: means and variances."""
+    from scipy.special import betainc
+
+    if not (one[0] > 0.0 and one[1] > 0.0):
+        return 0.0
+    scales = one[1] / one[0], other[1] / other[0]
+    shapes = one[0] / scales[0], other[0] / scales[1]
+    return float(betainc(shapes[1], shapes[0], scales[0] / (scales[0] + scales[1])))
+
+
+def _where(certainty: Callable[[float], float], sure: float, start: float, factor: float) -> float:
+    """Return the ratio from which on a limit further out is sure, by halving its logarithm."""
+    inner = outer = start
+    while certainty(outer) < sure:
+        if not 1e-300 < outer < 1e300:
+            return 0.0 if factor < 1.0 else math.inf
+        inner, outer = outer, outer * factor
+    for _ in range(60):
+        middle = math.sqrt(inner * outer)
+        if certainty(middle) < sure:
+            inner = middle
+        else:
+            outer = middle
+    return outer

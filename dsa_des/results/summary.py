@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from dsa_des.results.differences import EstimatedDifference, difference, estimate_of
 from dsa_des.results.ratio import PairedRatio
 from dsa_des.results.record import (
     EVENT,
@@ -11,13 +12,8 @@ from dsa_des.results.record import (
     Requirement,
     Result,
 )
-from dsa_des.results.rows import Rows, estimate_of, paired
-from dsa_des.results.statistics import (
-    Estimate,
-    EstimatedDifference,
-    difference,
-    within,
-)
+from dsa_des.results.rows import Rows, paired
+from dsa_des.results.statistics import Estimate, within
 
 
 @dataclass(frozen=True)

@@ -114,12 +114,20 @@ def notes_of_loading(scene: Scene) -> list[str]:
 
 def _unacknowledged(scene: Scene, notes: list[str]) -> list[str]:
     """Return notes without those that the blocks they are about acknowledge."""
-    known = tuple(
-        f"blocks.{name}: {text}"
-        for name, block in scene.blocks.items()
-        for text in block.options.acknowledged
-    )
-    return [text for text in notes if not text.startswith(known)]
+    known = {f"blocks.{name}": block.options.acknowledged for name, block in scene.blocks.items()}
+    return [
+        text
+        for text in notes
+        if not any(_begins(text, head, begin) for head, said in known.items() for begin in said)
+    ]
+
+
+def _begins(note: str, head: str, begin: str) -> bool:
+    """Return whether a note on `head` begins so, or what it says of a file, an aircraft, a key."""
+    if not begin or not note.startswith((f"{head}: ", f"{head}.")):
+        return False
+    rest = note[len(head) :].lstrip(":. ")
+    return rest.startswith(begin) or f": {begin}" in rest
 
 
 def say_notes(notes: Sequence[str]) -> None:

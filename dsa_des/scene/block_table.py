@@ -29,7 +29,8 @@ class BlockOptions(Parameters):
     acknowledged: list[str] = Field(
         default=[],
         description="Notes on this block that are known and meant, each by how it begins (a key's "
-        "name, mostly): they are not said again.",
+        "name, mostly), or what it says behind a colon, of a file or an aircraft: they are not "
+        "said again.",
     )
 
 

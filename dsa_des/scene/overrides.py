@@ -135,12 +135,16 @@ def apply_changes(
     return dropped
 
 
-def apply_sets(scene: SceneFile, assignments: Iterable[str]) -> None:
-    """Apply all ``--set`` to tables."""
+def apply_sets(study: SceneFile, assignments: Iterable[str]) -> None:
+    """Apply all ``--set`` to a study's tables; blocks are its scene's, below ``set``."""
     values, problems = read_sets(assignments)
-    scene.problems += problems
+    study.problems += problems
     for text, value in values:
-        scene.problems += set_value(scene, text, value, COMMAND_LINE)
+        if text.startswith("blocks."):
+            message = f"is a key of the study's scene: set.{text}"
+            study.problems.append(Problem(COMMAND_LINE, text, message))
+        else:
+            study.problems += set_value(study, text, value, COMMAND_LINE)
 
 
 def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:

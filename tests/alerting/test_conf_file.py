@@ -202,6 +202,17 @@ def test_a_cylinder_is_read(tmp_path):
     )
 
 
+@pytest.mark.parametrize("misspelt", ["CDCylindr", "Cylinders", "Nonsense"])
+def test_after_a_misspelt_class_its_sizes_are_those_of_the_class_that_is_meant(tmp_path, misspelt):
+    """Those of another class were said to be missing, and its own unknown."""
+    text = CYLINDER.replace("CDCylinder", misspelt)
+    (problem,) = said_of(tmp_path, text)
+    assert problem.endswith("TCAS3D" if misspelt == "Nonsense" else "did you mean 'CDCylinder'?")
+    if misspelt != "Nonsense":
+        both = said_of(tmp_path, text.replace("1000 [ft]", "1000 [kn]"))
+        assert len(both) == 2 and "CD_c_H has the unit [kn]" in both[1]
+
+
 TCAS = """\
 alerters = TCASII
 TCASII_load_core_detection_d = gov.nasa.larcfm.ACCoRD.TCAS3D

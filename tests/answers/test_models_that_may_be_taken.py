@@ -18,8 +18,9 @@ from dsa_des.answers.verdicts import (
     verdict_of,
 )
 from dsa_des.errors import UsageError
+from dsa_des.results.differences import difference, quantile_difference
 from dsa_des.results.record import EVENT, NUMBER, RATIO, RatioOf, Result
-from dsa_des.results.statistics import Estimate, difference, quantile_difference
+from dsa_des.results.statistics import Estimate
 
 RANGE = Result("range_m", NUMBER, "range, m")
 SEEN = Result("seen", EVENT, "seen")

@@ -142,6 +142,37 @@ def test_what_a_scene_acknowledges_is_not_said(tmp_path):
     assert call("run", "first_light", "--duration", "1", "--no-figures").stderr == ""
 
 
+GAP = """time,id,lat,lon,alt
+0,OWN,-41.0,174,900
+30,OWN,-41.0,174.0166667,900
+60,OWN,-41.0,174.0333333,900
+90,OWN,-41.0,174.05,900
+0,MOA,-41.0,174.05,900
+20,MOA,-41.0,174.04,900
+70,MOA,-41.0,174.01,900
+90,MOA,-41.0,174.00,900
+"""
+
+
+def test_what_a_file_gives_to_note_can_be_acknowledged_wherever_it_lies():
+    Path("flights").mkdir()
+    Path("flights/two.csv").write_text(GAP)
+    scene = 'extends = "replay_daa"\nduration_s = 90\n[blocks.traffic]\ntype = "traffic.file"\n'
+    scene += 'file = "two.csv"\nlongest_gap_s = 30\nownship = "OWN"\nacknowledged = {}\n'
+    for text, lines in ((["MOA: no sample"], 0), (["OWN: no sample", "sample", ""], 1)):
+        Path("flights/gap.toml").write_text(scene.format(text))
+        done = call("check", "flights/gap.toml")
+        assert done.exit_code == 0 and len(done.stderr.splitlines()) == lines, done.stderr
+
+
+def test_a_key_that_a_change_of_type_dropped_can_be_acknowledged():
+    scene = 'extends = "first_light"\n[blocks.radar]\ntype = "radar.range_boundary"\n'
+    for text, lines in (("[]", 1), ('["antenna_gain_db"]', 0)):
+        Path("other.toml").write_text(f"{scene}range_km = 4\nacknowledged = {text}\n")
+        said = [x for x in call("check", "other.toml").stderr.splitlines() if "antenna_gain" in x]
+        assert len(said) == lines
+
+
 OWN = """
 import numpy as np
 from components.sensor import Look, Sensor, SensorParameters

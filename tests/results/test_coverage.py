@@ -7,9 +7,9 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from dsa_des.results.differences import difference, paired_units
 from dsa_des.results.record import EVENT, NUMBER, SHARE, TRIALS, Result
-from dsa_des.results.rows import paired_units
-from dsa_des.results.statistics import Estimate, difference, mean, share
+from dsa_des.results.statistics import Estimate, mean, share
 from dsa_des.results.summary import compare_axis, summarise
 from dsa_des.studies.draws import parse_draw
 from tests.results.conftest import rows_of_table

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from dsa_des.results import statistics
+from dsa_des.results import differences, statistics
 from dsa_des.results.labels import AxisName, axis_label, readable, signed, unit_of, value_label
 from dsa_des.results.printing import rounded
 
@@ -35,14 +35,14 @@ def test_a_mean_of_fractions_and_a_difference_of_shares_have_possible_intervals(
     assert both[0].half_width == pytest.approx(both[1].half_width, rel=0.01)
     alike = statistics.fraction(np.ones(20), 0.95)
     assert (alike.low, alike.high) == pytest.approx((1.0 - 0.1611, 1.0), abs=5e-5)
-    found = statistics.difference(np.zeros(3), np.array([0.9, 0.2, 1.0]), 0.95, kind="fraction")
+    found = differences.difference(np.zeros(3), np.array([0.9, 0.2, 1.0]), 0.95, kind="fraction")
     assert (found.paired.high, found.unpaired.high) == (1.0, 1.0) and found.paired.value < 0.8
 
 
 def test_missing_values_are_counted_and_left_out() -> None:
     first = np.array([1.0, np.nan, 3.0, 4.0])
     second = np.array([2.0, 2.0, np.nan, 6.0])
-    found = statistics.difference(first, second, 0.95)
+    found = differences.difference(first, second, 0.95)
     assert (found.paired.count, found.only_first, found.only_second) == (2, 1, 1)
     assert found.paired.value == 1.5
     assert math.isnan(statistics.mean(np.array([np.nan]), 0.95).value)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dsa_des.results.statistics import FEW, difference, mean, share
+from dsa_des.results.differences import difference
+from dsa_des.results.statistics import FEW, mean, share
 
 RNG = np.random.default_rng(4)
 NORMAL = RNG.normal(3.0, 2.0, 24)

@@ -8,8 +8,8 @@ import pytest
 from scipy import stats
 
 from dsa_des.commands.what_changed import ConditionPair, say_what_changed
+from dsa_des.results.differences import difference
 from dsa_des.results.record import NUMBER, SHARE, TRIALS, Result
-from dsa_des.results.statistics import difference
 from dsa_des.results.summary import compare_axis, summarise
 from tests.results.conftest import rows_of_table
 

@@ -114,6 +114,16 @@ def test_all_problems_come_at_once(small: Path) -> None:
     assert "2 problems" in output and "is empty" in output and "uniform takes two" in output
 
 
+def test_a_key_of_the_scene_that_the_command_line_gives_the_study_is_one_problem(
+    small: Path,
+) -> None:
+    output = refused("study.toml", "--set", "blocks.radar.enabled=false")
+    assert output.strip() == (
+        "error: command line: blocks.radar.enabled: is a key of the study's scene: "
+        "set.blocks.radar.enabled"
+    )
+
+
 def test_problems_of_all_kinds_come_in_one_report(small: Path) -> None:
     changed("[1, 5]", "[1, -5]")  # of the scene
     changed("replicas = 24", "replicas = 0")  # of the study

@@ -1,0 +1,273 @@
+"""How two conditions differ on the same units: of means, shares, quantiles and ratios."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.results.ratio import PairedRatio, influences, paired_ratio, unseen_variance
+from dsa_des.results.statistics import (
+    FEW,
+    Estimate,
+    mean,
+    normal_error,
+    normal_quantile,
+    quantile,
+    scaled,
+    standard_error,
+    symmetric,
+    t_quantile,
+    within,
+)
+
+_RESAMPLES = 1000
+#: Of the largest of some values: a smaller difference is one of rounding.
+_ALIKE = 1e-9
+
+
+def changes_of(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return second minus first; 0 where the two are alike but for how they were rounded.
+
+    That is, within 1e-9 of the largest of them: a quantity is never known so well, and rounding
+    adds up to far less.
+    """
+    changes = second - first
+    both = np.abs(np.concatenate([first, second]))
+    finite = both[np.isfinite(both)]
+    resolution = _ALIKE * float(finite.max(initial=0.0))
+    return np.where(np.abs(changes) <= resolution, 0.0, changes)
+
+
+def paired_units(
+    units: IntArray, first: FloatArray, second: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return units, and each one's mean value in two conditions, over runs that have both.
+
+    Of a unit without such a run one condition keeps its mean, and the other has no value: runs
+    with a value on one side only would compare other draws.
+
+    A run without a value has NaN.
+    """
+    result, index = np.unique(units, return_inverse=True)
+
+    def means(values: FloatArray, used: AnyArray) -> FloatArray:
+        many = np.bincount(index[used], minlength=len(result))
+        total = np.bincount(index[used], weights=values[used], minlength=len(result))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(many > 0, total / many, np.nan)
+
+    here, there = ~np.isnan(first), ~np.isnan(second)
+    one, two = means(first, here & there), means(second, here & there)
+    without = np.isnan(one)
+    alone = np.where(without, means(first, here), np.nan)
+    one = np.where(without, alone, one)
+    two = np.where(without & np.isnan(alone), means(second, there), two)
+    return result, one, two
+
+
+@dataclass(frozen=True)
+class EstimatedDifference:
+    """How two conditions differ on the same units."""
+
+    #: Mean of the differences, unit by unit.
+    paired: Estimate
+    #: The same mean with the interval it would have on independent units (Welch).
+    unpaired: Estimate
+    #: Units that have a value in one condition only; they are in neither estimate.
+    only_first: int
+    only_second: int
+
+    @property
+    def narrower(self) -> float:
+        """How many times narrower the paired interval is; infinite where nothing differs."""
+        if self.paired.half_width == 0.0:
+            return math.inf if self.unpaired.half_width > 0.0 else math.nan
+        return self.unpaired.half_width / self.paired.half_width
+
+
+def difference(
+    first: FloatArray,
+    second: FloatArray,
+    confidence: float,
+    method: str = "t",
+    *,
+    kind: str = "number",
+) -> EstimatedDifference:
+    """Return second minus first on common units.
+
+    NaN is a unit without a value. Of all kinds but numbers no interval reaches beyond -1 and 1.
+    Events, and shares of which each unit has all or nothing, are counted: their paired interval is
+    that of Bonett and Price, "Adjusted Wald confidence interval for a difference of binomial
+    proportions based on paired data", Journal of Educational and Behavioral Statistics 37 (2012);
+    the unpaired one is that of Agresti and Caffo, "Simple and effective confidence intervals for
+    proportions and differences of proportions", The American Statistician 54 (2000). Neither is a
+    point where no unit differs.
+    """
+    here, there = ~np.isnan(first), ~np.isnan(second)
+    both = here & there
+    changes = changes_of(first[both], second[both])
+    whole = kind == "share" and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
+    counted = len(changes) > 1 and (kind == "event" or whole)
+    paired = _counted(changes, confidence) if counted else mean(changes, confidence, method)
+    apart = counted and bool(np.isin((first[both], second[both]), (0.0, 1.0)).all())
+    if apart:
+        unpaired = _counted_apart(first[both], second[both], confidence)
+    else:
+        unpaired = _welch(first[both], changes, confidence)
+    if kind != "number":
+        paired, unpaired = _of_shares(paired), _of_shares(unpaired)
+    return EstimatedDifference(
+        paired,
+        unpaired,
+        int((here & ~there).sum()),
+        int((there & ~here).sum()),
+    )
+
+
+def quantile_difference(
+    first: FloatArray, second: FloatArray, share: float, confidence: float
+) -> EstimatedDifference:
+    """Return how a quantile over the same units differs between two conditions.
+
+    The interval is the normal distribution's with the spread of 1000 resamples of the units, always
+    the same ones, each with its values under both conditions (Efron and Tibshirani, chapter 8.6).
+    NaN is a unit without a value. Where a quantile has no interval of its own, this has none.
+    """
+    here, there = ~np.isnan(first), ~np.isnan(second)
+    one, two = first[here & there], second[here & there]
+    alone = int((here & ~there).sum()), int((there & ~here).sum())
+    ends = [quantile(values, share, confidence) for values in (one, two)]
+    value = ends[1].value - ends[0].value
+    if any(end.few for end in ends):
+        none = Estimate(value, math.nan, math.nan, len(one), True)
+        return EstimatedDifference(none, none, *alone)
+    index = max(0, math.ceil(share * len(one) - 1e-9) - 1)
+    generator = np.random.Generator(np.random.Philox(len(one)))
+    drawn = np.empty(_RESAMPLES)
+    for k in range(len(drawn)):
+        units = generator.integers(0, len(one), len(one))
+        low, high = (np.partition(values[units], index)[index] for values in (one, two))
+        drawn[k] = high - low
+    apart = math.hypot(*(normal_error(end, confidence) for end in ends))
+    return EstimatedDifference(
+        symmetric(value, float(drawn.std(ddof=1)), len(one), False, confidence),
+        symmetric(value, apart, len(one), False, confidence),
+        *alone,
+    )
+
+
+def _of_shares(result: Estimate) -> Estimate:
+    """Return a difference of shares whose interval holds nothing that none can be."""
+    return within(result, -1.0, 1.0)
+
+
+def _counted(changes: FloatArray, confidence: float) -> Estimate:
+    """Return the mean of changes of events, as if one unit more had gained and one more had lost.
+
+    Units of several runs differ by parts of an event: there the two lie the smallest part that is
+    seen to either side of the mean.
+    """
+    count = len(changes)
+    value = math.fsum(changes) / count
+    sizes = np.abs(changes)
+    step = float(sizes[sizes > 1e-9].min(initial=1.0))
+    about = 0.0 if step == 1.0 else value
+    more = np.append(changes, [about - step, about + step])
+    middle = math.fsum(more) / len(more)
+    error = math.sqrt(math.fsum((more - middle) ** 2)) / len(more)
+    half = t_quantile(count - 1, confidence) * error
+    return Estimate(value, middle - half, middle + half, count, count < FEW)
+
+
+def _counted_apart(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:
+    """Return the difference of two shares, each as if of one unit more of either kind."""
+    count = len(first)
+    one, other = ((result.sum() + 1.0) / (count + 2.0) for result in (first, second))
+    error = math.sqrt((one * (1.0 - one) + other * (1.0 - other)) / (count + 2.0))
+    half = normal_quantile(confidence) * error
+    value, middle = float(second.mean() - first.mean()), float(other - one)
+    return Estimate(value, middle - half, middle + half, count, count < FEW)
+
+
+def _welch(first: FloatArray, changes: FloatArray, confidence: float) -> Estimate:
+    count = len(first)
+    if count < 2:
+        return Estimate(math.nan, math.nan, math.nan, count, True)
+    value = mean(changes, confidence).value
+    errors, exponent = scaled(np.array([standard_error(first), standard_error(first + changes)]))
+    one, other = (errors**2).tolist()
+    if one + other == 0.0:
+        return Estimate(value, value, value, count, count < FEW)
+    degrees = (one + other) ** 2 * (count - 1) / (one**2 + other**2)
+    half = t_quantile(degrees, confidence) * math.ldexp(math.sqrt(one + other), exponent)
+    return Estimate(value, value - half, value + half, count, count < FEW)
+
+
+class RatioTerms(NamedTuple):
+    """What a ratio of weighted events is made of, run by run."""
+
+    below: FloatArray
+    above: FloatArray
+    weight: FloatArray
+    #: What hangs together.
+    cluster: AnyArray
+    #: For how many runs each one stands; None where all are flown.
+    stands_for: FloatArray | None
+
+    def of(self, some: IntArray | BoolArray) -> "RatioTerms":
+        """Return those of some runs."""
+        rest = None if self.stands_for is None else self.stands_for[some]
+        return RatioTerms(
+            self.below[some], self.above[some], self.weight[some], self.cluster[some], rest
+        )
+
+
+def ratio_difference(
+    first: RatioTerms, second: RatioTerms, alone: Sequence[int], confidence: float
+) -> EstimatedDifference:
+    """Return how a ratio differs between two conditions on the same runs, by their influences.
+
+    What each run adds to the error of either ratio is subtracted run by run, so what they share
+    falls out; the interval is that of the normal distribution. Its variance holds one run more that
+    gains the event and one that loses it, of the weight of those below the line: as Bonett and
+    Price do for events without weights (`difference`), so that runs which all agree still leave as
+    much open as so many can. `alone` says how many runs only one condition has.
+    """
+    parts, ratios = [], []
+    for below, above, weight, _, some in (first, second):
+        ratio = paired_ratio(
+            below, above, weight, cluster=first.cluster, stands_for=some, confidence=confidence,
+            method="delta",
+        )  # fmt: skip
+        ratios.append(ratio)
+        if not ratio.reason:
+            parts.append(influences(below, above, weight, ratio.ratio, some))
+    if len(parts) < 2:
+        none = Estimate(np.nan, np.nan, np.nan, 0, True)
+        return EstimatedDifference(none, none, *alone)
+    _, index = np.unique(first.cluster, return_inverse=True)
+    each = np.array([np.bincount(index, weights=part) for part in parts])
+    value, few = ratios[1].ratio - ratios[0].ratio, any(ratio.few for ratio in ratios)
+    events = np.bincount(index, weights=second.weight * second.below).astype(float)
+    more = 2.0 * unseen_variance(events)
+    joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + more))
+    # A ratio whose runs all agree has no such error; its interval tells another.
+    alike = sum(
+        normal_error(estimate_of(ratio), confidence) ** 2
+        for ratio, part in zip(ratios, each, strict=True)
+        if np.abs(part).max() < 1e-12
+    )
+    apart = float(np.sqrt((each**2).sum() + alike + more))
+    return EstimatedDifference(
+        symmetric(value, joint, each.shape[1], few, confidence),
+        symmetric(value, apart, each.shape[1], few, confidence),
+        *alone,
+    )
+
+
+def estimate_of(ratio: PairedRatio) -> Estimate:
+    """Return a ratio as the summary's other lines are."""
+    return Estimate(ratio.ratio, *ratio.interval, ratio.clusters, ratio.few)
