@@ -19,7 +19,7 @@ from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.extend(sorted({str(path.parent) for path in (ROOT / "tests").rglob("*.py")} - {*sys.path}))
+sys.path.append(str(ROOT / "tests" / "support"))
 
 import networkx as nx  # noqa: E402
 from import_graph import imports, modules  # noqa: E402

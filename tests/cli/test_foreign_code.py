@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import dsa_des
 from tests import warm_process
 
 CONFIGS = Path(__file__).parent.parent.parent / "configs"
@@ -313,3 +314,27 @@ def test_the_program_run_as_a_module_runs_nothing_of_the_working_directory(shado
                           capture_output=True, text=True, timeout=300, env=plain,
                           check=False)  # fmt: skip
     assert (done.returncode, ran(shadows)) == (0, []), done.stderr
+
+
+@pytest.mark.parametrize(
+    ("argv", "orig", "first", "is_left_out"),
+    [
+        (["-m"], ["python", "-m", "dsa_des"], "here", True),
+        (["-m"], ["python", "-mdsa_des"], "here", True),
+        (["-m"], ["python", "-m", "pytest"], "here", False),
+        (["run.py"], ["python", "run.py", "dsa_des"], "here", False),
+        (["-m"], ["python", "-m", "dsa_des"], "elsewhere", False),
+        (["-m"], ["python", "-m", "dsa_des"], "home", False),
+    ],
+)
+def test_only_as_a_program_the_working_directory_is_no_place_of_modules(
+    argv, orig, first, is_left_out, monkeypatch, tmp_path
+):
+    home = str(Path(dsa_des.__file__).parents[1])
+    monkeypatch.chdir(home if first == "home" else tmp_path)
+    place = {"here": os.getcwd(), "elsewhere": "/nowhere", "home": home}[first]
+    monkeypatch.setattr(sys, "path", [place, "/other"])
+    monkeypatch.setattr(sys, "argv", argv)
+    monkeypatch.setattr(sys, "orig_argv", orig)
+    dsa_des._without_working_directory()
+    assert sys.path == (["/other"] if is_left_out else [place, "/other"])

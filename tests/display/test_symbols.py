@@ -4,10 +4,21 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 from components.display import symbols as module
-from components.display.symbols import Labels, by_target, draw_density, evenly, staggered, styles_of
+from components.display.symbols import (
+    OWN,
+    TARGET,
+    Labels,
+    by_target,
+    draw_density,
+    draw_lines,
+    evenly,
+    staggered,
+    styles_of,
+)
 from components.fusion.gated import Gated
 from components.optical.sensors import ElectroOptical, Infrared, Projection
 from components.radar.radar import RangeBoundary
@@ -181,3 +192,19 @@ def test_density_counts_each_line_once_in_every_cell_that_it_crosses():
     assert cells[20, 80] == 0.0 and cells[30, 5] == 1.0
     assert cells.sum() == 2 * 160 + cells[20].sum() + 1
     assert axes.get_xlim() == (0.0, 160.0) and axes.get_ylim() == (0.0, 100.0)
+
+
+@pytest.mark.parametrize(("targets", "wide"), [(0, 1.0), (2, 1.0), (module.MANY, 0.6)])
+def test_the_ownship_s_line_is_drawn_over_those_of_targets_if_there_is_one(targets, wide):
+    lines = [np.array([[0.0, k], [1.0, k]]) for k in range(targets)]
+    own = np.array([[0.0, 0.5], [9.0, 0.5]])
+    axes = Figure().add_subplot()
+    draw_lines(axes, lines, own)
+    (drawn,) = axes.collections
+    assert [part.tolist() for part in drawn.get_segments()] == [p.tolist() for p in [*lines, own]]
+    assert drawn.get_linewidths() == [wide] * targets + [2.0]
+    assert drawn.get_colors() == pytest.approx(
+        np.array([to_rgba(TARGET)] * targets + [to_rgba(OWN)])
+    )
+    draw_lines(axes, lines)
+    assert [len(one.get_segments()) for one in axes.collections[1:]] == [targets] * (targets > 0)

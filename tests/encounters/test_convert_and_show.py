@@ -1,6 +1,7 @@
 """Public formats read and written, and what is said of a set."""
 
 import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from components.encounters.set_commands import closest_approaches
 from components.formats.set_file import read_set
-from components.formats.track_files import read_paired_text
+from components.formats.track_files import _refuse_cut_off, read_paired_text
 from tests.encounters.reference_data import reference_file
 from tests.encounters.test_set_file import call
 
@@ -152,3 +153,25 @@ def test_what_is_said_of_a_set(tmp_path: Path) -> None:
     assert closest.horizontal_m[0] == pytest.approx(level)
     assert closest.vertical_m[0] == pytest.approx((20 + 10 * share) * FOOT)
     assert call("show", tmp_path / "none.parquet").exit_code == 2
+
+
+@pytest.mark.parametrize("count", [10, 3_000_000])
+def test_packed_elements_are_looked_through_to_their_ends(count):
+    """A megabyte at a time, of the few kilobytes that so many zeros are packed into."""
+    packed = zlib.compress(b"\0" * count, 9)
+    head = b" " * 124 + b"\0\1IM"
+    element = struct.pack("<II", 15, len(packed)) + packed
+    _refuse_cut_off(head + element + element)
+    short = head + struct.pack("<II", 15, len(packed) - 6) + packed[:-6]
+    with pytest.raises(ValueError, match=rf"packed element that ends at byte {len(short)} is cut"):
+        _refuse_cut_off(short)
+    with pytest.raises(ValueError, match=f"an element of {len(packed)} bytes is cut off at byte"):
+        _refuse_cut_off((head + element)[:-1])
+
+
+@pytest.mark.parametrize("at", [(89.5, 0.0), (0.0, 361.0)])
+def test_a_set_is_put_at_no_impossible_origin(tmp_path, at):
+    out = tmp_path / "out.parquet"
+    done = call("convert", paired(tmp_path), "--at", *at, "--out", out)
+    assert done.exit_code == 2 and not out.exists()
+    assert f"--at {at[0]} {at[1]}: latitude must lie within ±89, longitude" in done.stderr

@@ -1,5 +1,6 @@
 """Sets of encounters: what is written is read, and what is damaged is named or left out."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from components.encounters.pair_densities import PairingRules
 from components.encounters.pairing import PairSampler
 from components.formats.encounter_set import NoSuchEncounter, geometry_class
 from components.formats.set_file import EncounterSetError, read_set
+from tests.encounters.scenes.test_encounter_traffic_keys import events
 from tests.encounters.test_pairing import TURNS
 
 FOOT = 0.3048
@@ -104,6 +106,36 @@ def test_tracks_are_read_as_they_stand(tmp_path: Path) -> None:
     assert found.path(0)[0].tolist() == [0.0, 1.0, 2.5]
     with pytest.raises(NoSuchEncounter, match="there is no encounter 4; it holds 2, numbered from"):
         found.index_of(4)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"speed_mps": [50.0, 0.0, 50.0, 70.0]}, "4: one: speed_mps must be above 0"),
+        ({"speed_mps": [50.0, -1.0, 50.0, 70.0]}, "4: one: speed_mps must be above 0"),
+        (
+            {"heading_rad": [1.0, 1.0, 1.0, math.nan]},
+            "9: other: heading_rad must be a number within ±10000",
+        ),
+        ({"duration_s": [20.0, math.nan, 20.0, 20.0]}, "4: one: duration_s is missing"),
+        ({"duration_s": [20.0, 20.0, 20.0, 86_401.0]}, "other: duration_s must lie in (0, 86400]"),
+        ({"duration_s": [20.0, 20.0, 20.0, 0.0]}, "other: duration_s must lie in (0, 86400]"),
+        ({"time_s": [[0.0], [0.5, 3.0], [0.0], [0.0]]}, "one: the first event must be at time_s 0"),
+    ],
+)
+def test_a_flight_by_events_that_cannot_be_flown_is_named(
+    tmp_path: Path, changes: dict, said: str
+) -> None:
+    with pytest.raises(EncounterSetError) as error:
+        read_set(Path(events(tmp_path / "set.parquet", **changes)))
+    assert said in str(error.value)
+    assert len(read_set(Path(events(tmp_path / "set.parquet")))) == 2
+
+
+def test_weights_are_worth_their_effective_sample_size(tmp_path: Path) -> None:
+    """Of 3 and 1: 4 squared, over 10."""
+    done = call("show", written(tmp_path, weight=[3.0, 3.0, 1.0, 1.0, 1.0]))
+    assert "sum of weights 4, effective sample size 1.6" in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from components.estimation.batched import distance_squared
+from components.estimation.batched import cholesky, distance_squared, solve_lower
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import innovation, updated
 from components.estimation.measurement import Kind, expected, linearised, residual
@@ -108,3 +108,19 @@ def test_a_track_is_the_same_to_the_bit_alone_or_among_others(name):
     for which in (np.array([0]), np.array([66]), np.array([13, 14, 15]), np.arange(5, 38)):
         for part, whole in zip(run(which), together, strict=True):
             assert part.tobytes() == np.ascontiguousarray(whole[..., which]).tobytes()
+
+
+def test_roots_are_lower_triangles_whose_diagonal_is_rounded_once():
+    """Of a variance alone the root is its square root, to the bit; and NaN of what is none."""
+    draw = np.random.default_rng(3)
+    variance = draw.uniform(1e-3, 1e6, 200)
+    np.testing.assert_array_equal(cholesky(variance.reshape(1, 1, -1))[0, 0], np.sqrt(variance))
+    whole = draw.normal(size=(4, 4, 30))
+    whole = np.einsum("ikn,jkn->ijn", whole, whole) + np.eye(4)[:, :, None]
+    root = cholesky(whole)
+    for k in range(30):
+        np.testing.assert_allclose(root[:, :, k], np.linalg.cholesky(whole[:, :, k]), atol=1e-12)
+    right = draw.normal(size=(4, 2, 30))
+    solved = solve_lower(root, right)
+    np.testing.assert_allclose(np.einsum("ikn,kjn->ijn", root, solved), right, atol=1e-12)
+    assert np.isnan(cholesky(np.array([[[-1.0, 0.0, np.nan]]]))).all()

@@ -8,6 +8,7 @@ from components.estimation.kalman import innovation, updated
 from components.estimation.measurement import Kind, expected, linearised, residual
 from components.estimation.modified_polar import moved_in_polar
 from components.estimation.motion import ConstantVelocity, predict
+from components.tracking.association import is_bent
 
 RNG = np.random.default_rng(6)
 
@@ -107,3 +108,31 @@ def test_ranges_are_not_made_up_from_directions():
         found[way] = float(np.mean(error**2 / variance))
     assert 0.6 < found["polar"] < 1.5
     assert found["cartesian"] > 10.0
+
+
+@pytest.mark.parametrize("bearing_deg", [0.0, 37.0, 200.0])
+def test_a_track_is_bent_where_its_arc_leaves_the_line_by_a_third_of_its_depth(bearing_deg):
+    """At two deviations across, the sagitta of the arc is 2 s²/r: 0.3 of 20 m along at 122.5 m."""
+    across_m = np.array([30.0, 122.0, 123.0, 900.0])
+    way = np.radians(bearing_deg)
+    along, across = np.array([np.cos(way), np.sin(way)]), np.array([-np.sin(way), np.cos(way)])
+    state, spread = np.zeros((6, 4)), np.zeros((6, 6, 4))
+    state[:3] = np.array([100.0, -50.0, 7.0])[:, None]
+    state[:2] += 5000.0 * along[:, None]
+    spread[:2, :2] = (20.0**2 * np.outer(along, along))[:, :, None]
+    spread[:2, :2] += across_m**2 * np.outer(across, across)[:, :, None]
+    place = SensorPose(
+        np.array([100.0, -50.0, 7.0])[:, None] + np.zeros((3, 4)), np.zeros((3, 3, 4))
+    )
+
+    class Tracks:
+        def __len__(self):
+            return 4
+
+        def states(self):
+            return [state]
+
+        def covariances(self):
+            return [spread]
+
+    assert is_bent(Tracks(), place).tolist() == [False, False, True, True]

@@ -17,6 +17,7 @@ from components.display.recorded_run import RecordedTables
 from components.display.symbols import LEVELS_ON_DARK, ON_DARK
 from components.export.command import export
 from components.export.czml import czml_text
+from components.export.exported import _geoid
 from components.export.kml import kml_text
 from components.export.mcap_export import mcap_bytes
 from components.sensor.marks import EO, RADAR, TRACKER
@@ -180,6 +181,10 @@ def test_czml_holds_the_same_above_the_ellipsoid(tmp_path):
     wanted = list(courses())
     assert set(moving) == {name for name, _, _ in wanted}
     assert len({p["id"] for p in packets}) == len(packets)
+    # An alert goes with an aircraft or a track: its words stand below the other's.
+    offset = {p["id"]: p["label"]["pixelOffset"]["cartesian2"] for p in moving.values()}
+    assert {tuple(at) for id, at in offset.items() if id.startswith("alert/")} == {(12, 16)}
+    assert {tuple(at) for id, at in offset.items() if not id.startswith("alert/")} == {(12, 0)}
     for name, colour, samples in wanted:
         packet, rows = moving[name], np.array(samples)
         found = np.reshape(packet["position"]["cartographicDegrees"], (-1, 4))
@@ -257,6 +262,23 @@ def test_kml_is_built_as_its_schema_has_it(tmp_path):
             assert counts[0] == counts[1] > 0
     ids = [s.get("id") for s in root.findall(".//k:Style", SPACE)]
     assert len(set(ids)) == len(ids)
+
+
+@pytest.mark.parametrize(
+    ("terrain", "given_m", "geoid_m", "said"),
+    [
+        ("", None, 0.0, "--geoid-m is 0"), ("", -12.5, -12.5, ""),
+        ('[terrain]\nraster = "x.hgt"\nraster_offset_m = 8\n', None, 8.0, "(geoid 8 m above"),
+        ('[terrain]\nraster = "x.hgt"\nraster_offset_m = 8\n', 3.0, 3.0, ""),
+    ],
+)  # fmt: skip
+def test_the_geoid_is_given_or_the_terrain_s_or_taken_for_the_ellipsoid(
+    tmp_path, terrain, given_m, geoid_m, said
+):
+    tables = crafted(tmp_path)
+    (tmp_path / "scene.toml").write_text(terrain + SCENE)
+    words, found_m = _geoid(tables, given_m)
+    assert found_m == geoid_m and said in words and bool(words) is bool(said)
 
 
 @pytest.mark.parametrize(

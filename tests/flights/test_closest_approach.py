@@ -1,6 +1,7 @@
 """Closest approaches: what is found by halving time is what looking at every time finds."""
 
 import tracemalloc
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,9 +10,11 @@ from hypothesis import strategies as st
 
 from components.flights import closest_approach
 from components.flights.closest_approach import (
+    Approaches,
     KnownTimes,
     RegularTimes,
     closest_approaches,
+    look_between,
 )
 from components.flights.legs import Straight, Turn
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
@@ -160,3 +163,40 @@ def test_ties_go_to_the_first_time():
     target = ScriptedTrajectory("t", lat_deg=52, lon_deg=4.1, alt_m=100, start_time_s=2.5)
     ((time_s, _),) = found(own, [target], ScriptedFleet([target]), [RegularTimes(1.0, 9.0)], 9.0)
     assert time_s == 3.0
+
+
+@pytest.mark.parametrize("passes_s", [3.3137, 3.999, 4.6, 2.004])
+@pytest.mark.parametrize("step_s", [1.5, 2.0])
+def test_between_two_times_the_closest_approach_is_that_of_straight_flights(passes_s, step_s):
+    """Past each other on crossing ways along the equator: the vertex of a parabola.
+
+    The first stays 200 m above. Three times are known, 1.1 s before it at the most.
+    """
+    metre = 360.0 / 40_075_016.7
+    known_s = np.array([passes_s - 1.1, passes_s + 0.9, 9.0])
+    speed_mps = np.array([90.0, 40.0, 70.0])
+
+    def place(east_m, up_m):
+        zeros = np.zeros_like(east_m)
+        return SimpleNamespace(
+            lat_deg=zeros, lon_deg=10.0 + east_m * metre, alt_m=zeros + up_m,
+            present=np.ones(len(east_m), dtype=bool),
+        )  # fmt: skip
+
+    def other_at(target, time_s):
+        return place(speed_mps[target] * (time_s - passes_s), 200.0)
+
+    def own_at(target, time_s):
+        return place(np.zeros(len(time_s)), 0.0)
+
+    def range_m(time_s, k):
+        return np.hypot(200.0, speed_mps[k] * (time_s - passes_s))
+
+    best = Approaches(known_s.copy(), np.array([range_m(t, k) for k, t in enumerate(known_s)]))
+    end_s = np.array([passes_s + 30.0, passes_s - 0.4, 30.0])
+    look_between(own_at, other_at, np.full(3, step_s), (np.zeros(3), end_s), best)
+    # The second is not there any more, and the third's step ends before it passes.
+    expected_s = [passes_s, passes_s - 0.4, 9.0 - 1.11 * step_s]
+    assert best.time_s[:2] == pytest.approx(expected_s[:2], abs=2e-3)
+    assert best.range_m[:2] == pytest.approx([200.0, range_m(expected_s[1], 1)], abs=0.02)
+    assert best.time_s[2] == pytest.approx(expected_s[2], abs=1e-3)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.flights.point_mass import FT_S_PER_KT, fly_euler, fly_point_mass
+from components.flights.point_mass import FT_S_PER_KT, fly_euler, fly_point_mass, summed
 
 
 def commands(seconds: int, a: float, climb: float, turn_deg: float, tracks: int = 1):
@@ -121,3 +121,13 @@ def test_rates_are_those_of_a_coordinated_body_in_any_attitude() -> None:
     euler = fly_euler(np.full(40, 5e3), np.full(40, 220.0), climb * 0.0, climb, turn, own)
     assert euler.north_ft[1] == pytest.approx(220.0 * np.cos(own))
     assert euler.east_ft[1] == pytest.approx(220.0 * np.sin(own))
+
+
+@pytest.mark.parametrize("count", [1, 3, 5000])
+def test_sums_begin_at_the_start_and_take_each_rate_once(count):
+    start = np.arange(count) * 10.0
+    rates = np.stack([np.full(count, rate) for rate in (1.0, -2.0, 4.0, 8.0)])
+    expected = [start, start + 1.0, start - 1.0, start + 3.0]
+    np.testing.assert_array_equal(summed(start, rates), expected)
+    np.testing.assert_array_equal(summed(start, rates[:2]), expected[:2])
+    np.testing.assert_array_equal(summed(start, rates[:1]), expected[:1])

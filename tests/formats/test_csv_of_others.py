@@ -232,6 +232,21 @@ def test_altitudes_that_look_like_feet_are_told(tmp_path):
     assert read(tmp_path, "\n".join(["time,id,lat,lon,alt_m", *rows])).warnings == []
 
 
+@pytest.mark.parametrize(
+    ("heights", "is_noted"),
+    [
+        ((1000, 1025, 1050, 1100, 1200), True), ((1000, 1025, 1050, 1100), False),
+        # One that is no multiple of 25, and flight levels, which metres may be as well.
+        ((1000, 1025, 1050, 1101, 1200), False), ((1000, 1100, 1200, 1300, 1500), False),
+        ((1010, 1025, 1050, 1075, 1200), False), ((100, 1125, 1200, 1300, 1500), True),
+    ],
+)  # fmt: skip
+def test_feet_are_suspected_where_five_heights_are_all_steps_of_25(tmp_path, heights, is_noted):
+    rows = [f"{t},{n},47,{8 + t / 1000},{up}" for t, up in enumerate(heights) for n in "ab"]
+    file = read(tmp_path, "\n".join(["time,id,lat,lon,altitude", *rows]))
+    assert bool(file.warnings) is is_noted
+
+
 def test_check_tells_what_was_left_out_and_run_json_keeps_it(tmp_path, monkeypatch):
     from click.testing import CliRunner
 

@@ -114,6 +114,11 @@ def test_openskys_states_are_in_metres_at_the_times_of_their_positions(tmp_path)
     assert [c.sample_times_s.tolist() for c in file.aircraft] == [[0.0], [5.0], [0.0]]
     assert [c.alt_m.tolist() for c in file.aircraft] == [[1000.0], [1000.0], [1040.0]]
     assert np.ravel(file.ownship.velocity_enu_mps) == pytest.approx([0.0, -50.0, -2.0], abs=1e-9)
+    rows = [state("a1", 47.0), [*state("b2", 47.1)[:1], None, *state("b2", 47.1)[2:]]]
+    content = {"time": 1700000000, "states": rows}
+    assert read(tmp_path, content, ownship="Ca1").ownship.name == "a1"
+    with pytest.raises(TrafficFileError, match="None"):
+        read(tmp_path, content, ownship="None")
 
 
 SBS = """\
@@ -125,6 +130,8 @@ MSG,4,1,1,A1,1,2024/06/02,00:00:08.000,2024/06/02,00:00:08.000,,,100,0,,,0,,,,,
 MSG,3,1,1,A1,1,2024/06/02,00:00:09.000,2024/06/02,00:00:09.000,,3010,,,47.00463,8.0,,,,,,
 MSG,2,1,1,B2,1,2024/06/02,00:00:09.500,2024/06/02,00:00:09.500,,,5,0,47.1,8.0,,,,,,
 MSG,8,1,1,B2,1,2024/06/02,00:00:10.000,2024/06/02,00:00:10.000,,,,,,,,,,,,
+MSG,3,1,1,B2,1,2024/06/02,00:00:10.200,2024/06/02,00:00:10.200,,3100,,,47.1,,,,,,,
+MSG,3,1,1,B2,1,2024/06/02,00:00:10.400,2024/06/02,00:00:10.400,,3100,,,,8.0,,,,,,
 STA,,1,1,B2,1,2024/06/02,00:00:10.000,2024/06/02,00:00:10.000,RM
 """
 

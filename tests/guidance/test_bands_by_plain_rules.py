@@ -101,6 +101,13 @@ def test_bands_and_recovery_are_those_of_the_plain_rules(kind):
     assert sum(regions > 2 for regions, _ in seen) > 3
 
 
+def test_two_cylinders_made_smaller_beside_each_other_lead_out_as_by_the_plain_rules():
+    """A few of the states above, which are too many for the fast tests."""
+    random = np.random.default_rng(6)
+    seen = compare("vs", VALUES, [drawn(random) for _ in range(5)])
+    assert [recovery and recovery[1] for _, recovery in seen] == [1, 2, None, None, None]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_without_smaller_cylinders_the_search_ends_after_the_first(kind):
     random = np.random.default_rng(31)

@@ -1,7 +1,12 @@
 """Models that are picked by their error are those that the lines of sight come from."""
 
+import math
+
 import crooked
+import pytest
 from wired import chain, rows, run, sensor
+
+from components.line_of_sight.rungs import angle_text, name_of, range_text
 
 NEARLY_LEVEL = {**crooked.OWNSHIP, "pitch_deg": 0.3, "roll_deg": 0.2, "climb_mps": 0.0}
 RADAR = sensor(
@@ -46,3 +51,16 @@ def test_nothing_is_proven_of_ranges_behind_a_moving_target_filter():
         scene["blocks"]["transform"] |= {"model": "auto"}
         models[kind] = run(scene).summary["models"]["transform"]["earth"]
     assert models["none"] != "ellipsoid" == models["double_canceller"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (range_text(5.2531), "5.3 m"), (range_text(math.inf), "any size"),
+        (angle_text(math.radians(0.00412)), "0.0041 deg"), (angle_text(math.pi), "any size"),
+        (name_of("flat_earth"), "flat earth"),
+        (name_of("flat_earth", "first_order"), "flat earth with first-order attitude"),
+    ],
+)  # fmt: skip
+def test_errors_and_models_are_said_in_words(text: str, said: str) -> None:
+    assert text == said

@@ -109,6 +109,16 @@ def test_the_formula_counts_a_whole_beat(pair: tuple[str, ...]) -> None:
         assert share == Fraction(partners(own, other, before, after), len(own))
 
 
+def test_a_scan_waits_for_a_partner_no_longer_than_to_the_next(small: Path) -> None:
+    """Of ten scans that with the other sensor's and the one after; not the one before."""
+    metric = MetricSpec("fused_share").build(scene := scene_of_pair(
+        ("10", "1", "0", "0", "1/10"), Fraction(6)
+    ))  # fmt: skip
+    assert metric.expected(scene) == {
+        "fused_share.radar_with_ir": 0.2, "fused_share.ir_with_radar": 1.0
+    }  # fmt: skip
+
+
 def test_the_thesis_case() -> None:
     # 5 Hz and 2 Hz meet once a second: every second scan of the slower sensor (section 4.5).
     assert coincidence_share(Fraction(2), Fraction(5)) == Fraction(1, 2)

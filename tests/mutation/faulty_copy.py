@@ -128,8 +128,13 @@ def _run_here(folder: Path, arguments: list[str], plugins: Sequence[object], sai
             os.dup2(file, stream)
         os.environ["PYTHONPATH"] = str(folder)
         os.environ.pop("PYTEST_ADDOPTS", None)
-        here = {str(ROOT), str(Path(__file__).resolve().parent)}
-        sys.path[:] = [str(folder), *(place for place in sys.path if place not in here)]
+        ours = (str(ROOT / "tests"), str(ROOT / "docs"))
+        left = [place for place in sys.path if place != str(ROOT) and not place.startswith(ours)]
+        sys.path[:] = [str(folder), *left]
+        # What this tool has loaded of the tests would stand for what is in the copy.
+        for name, module in list(sys.modules.items()):
+            if str(getattr(module, "__file__", None) or "").startswith(ours):
+                del sys.modules[name]
         sys.argv = ["pytest", *arguments]
         # Processes that tests spawn would load this tool again.
         sys.modules["__main__"] = types.ModuleType("__main__")

@@ -36,6 +36,16 @@ def test_agrees_with_rotation_matrices(heading, pitch, roll, elevation, back):
     assert abs(area - reference(heading, pitch, roll, elevation, 12, 30, 90, back)) <= 1e-12
 
 
+@pytest.mark.parametrize("level", [0, 1, 2])
+def test_one_that_flies_level_beside_others_changes_nothing_of_theirs(level):
+    """And each is as alone, whether all, some or none of a look pitch."""
+    views = np.array([[0.3, 0.4, -0.7, 0.2], [2.5, -0.2, 0.1, -0.4], [-1.1, 0.6, 1.9, 0.3]]).T
+    views[1, :level] = 0.0
+    area = visible_area(*views, **AREAS)
+    for k in range(3):
+        assert abs(area[k] - reference(*views[:, k], 12, 30, 90)) <= 1e-12
+
+
 @pytest.mark.parametrize("approaching", [False, True])
 @pytest.mark.parametrize("off_rad", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
 def test_side_keeps_its_digits_along_the_long_axis(approaching, off_rad):

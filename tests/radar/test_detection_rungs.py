@@ -10,6 +10,8 @@ from components.radar.detection import (
     miss_probability,
     required_snr,
 )
+from components.radar.detection.ladder import DETECTION
+from dsa_des.block.ladder import Unavailable
 
 MODELS = [f"swerling{i}" for i in range(5)]
 
@@ -122,3 +124,19 @@ def test_albersheim_refuses(change, message):
     arguments = {"snr": 20.0, "false_alarm_probability": 1e-6, "model": "swerling0", **change}
     with pytest.raises(ValueError, match=message):
         detection_probability(method="albersheim", **arguments)
+
+
+@pytest.mark.parametrize(
+    ("block", "keys"),
+    [
+        ({"type": "radar.range_boundary", "range_km": 3.0}, {}),
+        ({"type": "radar.swerling", "calibrate": {"range_km": 4.0}, "range_km": 9.0},
+         {"range_km": 4.0}),
+        ({"type": "radar.threshold", "range_km": 9.0}, {"range_km": 9.0}),
+    ],
+)  # fmt: skip
+def test_a_boundary_lies_where_the_calibration_knows_it_else_at_the_limit(block, keys):
+    (rung,) = (rung for rung in DETECTION.rungs if rung.name == "range_boundary")
+    assert rung.changes(block) == keys
+    with pytest.raises(Unavailable, match=r"needs calibrate\.range_km or range_km"):
+        rung.changes({"type": "radar.threshold"})

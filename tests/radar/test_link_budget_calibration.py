@@ -273,3 +273,11 @@ def test_without_a_known_range_they_must_be_given(given, said):
     del radar["calibrate"]
     with pytest.raises(SceneError, match=said):
         dsa_des.load_scene(chain({"radar": radar}))
+
+
+def test_the_least_range_may_be_a_millimetre_and_no_less():
+    assert replace(OASYS, minimum_range_m=0.001).minimum_range_m == 0.001
+    with pytest.raises(
+        ValueError, match=r"minimum_range_m is 0\.000999: it must be at least 0\.001"
+    ):
+        replace(OASYS, minimum_range_m=0.000999)

@@ -72,6 +72,23 @@ def test_intervals_cover():
     assert 0.91 < np.mean(covered) < 0.985  # of 200
 
 
+@pytest.mark.parametrize("comes", [True, False])
+def test_a_repetition_s_share_is_the_product_of_its_stages(comes: bool) -> None:
+    """Of four runs the first comes within the level, and then three branches of it or none."""
+
+    def flown(runs, of, levels):
+        reached = np.full((1, len(runs)), np.nan)
+        some = slice(0, 1) if levels == [7.0] else slice(0, 3 if comes else 0)
+        reached[0, some] = 2.5
+        return FlownRuns(reached, np.ones(len(runs)), [None] * len(runs))
+
+    (found,) = repeated([roots(0, 4)], [5], (7.0, 0.0), flown)
+    assert found.flown == 8 and found.error is None
+    # One branch more at the last stage stands for a quarter of a quarter.
+    expected = (3 / 16, 3 / 64) if comes else (0.0, 1 / 16)
+    assert (found.probability, found.unseen) == pytest.approx(expected)
+
+
 def test_repetitions_are_what_each_is_alone():
     levels = (14.0, 7.0, 0.0)
     together = repeated([roots(n) for n in range(5)], [*range(5)], levels, chain)

@@ -45,6 +45,9 @@ def test_what_never_happens_is_said(small: Path) -> None:
     assert row["first_detection_range_m.radar"] is None
     assert row["first_detection_cut_off.radar"] == "never"
     assert row["declaration_cut_off.radar"] == "never"
+    assert row["declared.radar"] == 0 and row["declaration_time_s.radar"] is None
+    assert row["declared.ir"] == row["declared.any"] == 1
+    assert row["declaration_time_s.any"] == row["declaration_time_s.ir"]
     # A run without a loss of well clear is as it should be.
     assert row["well_clear_loss_cut_off"] is None
 

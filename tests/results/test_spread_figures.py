@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from dsa_des.cli import main
-from dsa_des.record.drawing import drawing
+from dsa_des.record.drawing import drawing, tight
 from dsa_des.results.curves import _dodge, _edges, draw_cdf, draw_polar
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.results.statistics import Estimate
@@ -143,3 +144,15 @@ def test_no_tick_has_an_offset_and_intervals_of_two_series_stand_side_by_side(tm
                 for bars in (first, second)
             ]
             assert places[1] - places[0] == pytest.approx(np.array([apart_px, 0.0]), abs=0.01)
+
+
+def test_ticks_of_a_logarithmic_axis_are_plain_numbers_and_of_another_are_left_alone():
+    figure = Figure()
+    axes = figure.add_subplot()
+    axes.plot([2.0, 8.0], [1.0, 2.0])
+    axes.set_xscale("log")
+    plain = axes.yaxis.get_major_formatter(), axes.yaxis.get_minor_formatter()
+    tight(figure)
+    shown = [text.get_text() for text in axes.get_xticklabels(which="both")]
+    assert {"2", "3", "6"} <= set(shown) and not any("$" in text for text in shown)
+    assert plain == (axes.yaxis.get_major_formatter(), axes.yaxis.get_minor_formatter())

@@ -7,6 +7,7 @@ from covering import covers
 from wired import chain, rows, run, sensor
 
 import dsa_des
+from components.surveillance.stated_errors import LATE
 from dsa_des.running.simulation import Simulation
 
 KINDS = ("surveillance.ads_b", "surveillance.active")
@@ -262,3 +263,35 @@ def test_range_rates_are_offered_by_whoever_reports_them(kind):
     rates = [row["range_rate_m_s"] for row in rows(run(scene(kind)), scan=2)]
     assert rates and offer.measures_range_rate is (kind == "surveillance.ads_b")
     assert {rate is not None for rate in rates} == {offer.measures_range_rate}
+
+
+def test_what_an_interrogator_offers_is_what_its_answers_have():
+    """A range and a bearing whose errors differ from answer to answer; exact ones have none."""
+    for measurement in ("exact", "do_365"):
+        found = scene("surveillance.active", measurement=measurement)
+        block = Simulation(dsa_des.load_scene(found))
+        offer = block.components["sensor"].offer("detections")
+        variances = offer.azimuth_variance_rad2, offer.elevation_variance_rad2
+        assert (*variances, offer.range_variance_m2) == (None, None, None)
+        assert offer.unstated_across_m2 == 0.0 and not offer.measures_range_rate
+        assert offer.tells is (measurement != "exact")
+        assert set(offer.lasting) == (set() if measurement == "exact" else {"range", "elevation"})
+        assert bool(offer.told_errors) is (measurement != "exact")
+
+
+@pytest.mark.parametrize(
+    ("late_s", "is_offered"), [((0.0, 0.0), False), ((0.0, 0.4), True), ((0.4, 0.4), True)]
+)
+def test_a_receiver_offers_that_positions_are_late_where_one_aircraft_s_may_be(late_s, is_offered):
+    targets = [
+        {**target, "ads_b": {"latency_s": late, "compensated_s": 0.0}}
+        for target, late in zip(crooked.TARGETS, late_s, strict=True)
+    ]
+    one = {"type": "surveillance.ads_b", "scan_rate_hz": 1, **EXACT["surveillance.ads_b"]}
+    made = Simulation(dsa_des.load_scene(chain({"sensor": one}, targets=targets)))
+    offer = made.components["sensor"].offer("detections")
+    assert (LATE in offer.told_errors) is is_offered
+    assert made.components["sensor"].steps["range_rate"] == 0.0
+    variances = offer.azimuth_variance_rad2, offer.elevation_variance_rad2
+    assert (*variances, offer.range_variance_m2, offer.range_rate_variance_m2_s2) == (None,) * 4
+    assert offer.unstated_across_m2 == 0.0 and offer.tells

@@ -178,6 +178,21 @@ def test_jitter_moves_scans_by_its_deviation_and_never_before_the_start():
     assert clock.ticks(np.array([0]))[0] >= 0
 
 
+@pytest.mark.parametrize(
+    ("drawn", "first_s", "second_s"),
+    [(-1.0, 0.0, 0.096), (2.0, 0.008, 0.108), (-100.0, 0.0, 0.055), (100.0, 0.045, 0.145)],
+)
+def test_jitter_is_its_deviation_times_what_is_drawn_and_less_than_half_a_period(
+    drawn: float, first_s: float, second_s: float
+) -> None:
+    spec = ClockSpec(Fraction(10), jitter_s=0.004)
+    clock = ScanClock(spec, 10**9, lambda scans: np.full(np.shape(scans), drawn))
+    assert clock.ticks(np.array([0, 1])).tolist() == [round(first_s * 1e9), round(second_s * 1e9)]
+    assert clock.before(np.array([0, 1, 2])).tolist() == [
+        -1, round(first_s * 1e9), round(second_s * 1e9)
+    ]  # fmt: skip
+
+
 def test_jitter_is_a_function_of_seed_block_and_scan_only():
     def ticks(seed, block, scans):
         draw = Streams(seed).scan_normals(block, "clock jitter")

@@ -132,3 +132,39 @@ def test_of_several_intruders_the_nearest_counts_and_events_are_anyones() -> Non
     assert not met.unsure_angles.any()
     twice = [(np.array([0]), straight(nearer)), (np.array([0]), straight(nearer))]
     assert meetings(twice, 1, 100.0, SIZES_M).unsure_angles.all()
+
+
+def test_pairs_are_inside_where_closely_spaced_places_on_their_ways_are() -> None:
+    """Level and climbing pairs, and some that do not move, near the edges of a cylinder."""
+    rng = np.random.default_rng(41)
+    count, limits = 240, (500.0, 100.0)
+    apart = rng.uniform(-1.0, 1.0, (3, 3, count)) * np.array([900.0, 900.0, 180.0])[:, None, None]
+    apart[2, :, :60] = apart[2, :1, :60]  # level
+    apart[:, :, 60:80] = apart[:, :1, 60:80]  # at rest
+    own = np.zeros_like(apart)
+    surely, unsure = PairsInPlane(PairPaths(np.array([0.0, 4.0, 9.0]), own, apart)).inside(*limits)
+    share = np.linspace(0.0, 1.0, 1501)[:, None]
+    inside = np.zeros(count, dtype=bool)
+    for k in (0, 1):
+        north, east, up = (one[k] + share * (one[k + 1] - one[k]) for one in apart)
+        inside |= ((np.hypot(north, east) < limits[0]) & (np.abs(up) < limits[1])).any(axis=0)
+    assert 40 < np.count_nonzero(inside) < 200 and np.count_nonzero(unsure) < 0.05 * count
+    assert (surely == inside)[~unsure].all()
+
+
+@pytest.mark.parametrize(
+    ("level_m", "up_m", "found"),
+    [
+        # 1.5 m and a thousandth of the radius are the plane's own error.
+        (497.9, 98.4, "surely"), (498.1, 0.0, "unsure"), (501.9, 0.0, "unsure"),
+        (502.1, 0.0, ""), (0.0, 98.6, "unsure"), (0.0, -101.4, "unsure"), (0.0, -101.6, ""),
+    ],
+)  # fmt: skip
+def test_what_is_as_near_a_limit_as_the_plane_errs_is_unsure(
+    level_m: float, up_m: float, found: str
+) -> None:
+    place = np.array([0.6 * level_m, 0.8 * level_m, up_m])
+    apart = np.repeat(place, 2).reshape(3, 2, 1)
+    pairs = PairsInPlane(PairPaths(np.array([0.0, 1.0]), np.zeros_like(apart), apart))
+    said = dict(zip(("surely", "unsure"), pairs.inside(500.0, 100.0), strict=True))
+    assert {name for name, is_so in said.items() if is_so[0]} == ({found} if found else set())

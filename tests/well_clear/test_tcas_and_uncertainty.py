@@ -72,9 +72,32 @@ def test_only_the_times_looked_at_count():
     state = tuple(np.array([part]) for part in (-3000.0, 0.0, 40.0, 80.0, 0.0, 0.0))
     level = {"altitude_m": np.array([1000.0]), "climb_mps": np.array([0.0]), "resolution": True}
     whole = tcas_span(state, **level, end_s=60.0)
+    # 3 km at 80 m/s are more than the 20 s of 1,000 m, 1.5 km are less: due at once.
+    assert whole.begin_s > 10.0
+    near = (np.array([-1500.0]), *state[1:])
+    assert tcas_span(near, **level, end_s=60.0).begin_s == 0.0
     part = tcas_span(state, **level, begin_s=whole.begin_s + 2.0, end_s=whole.begin_s + 9.0)
     assert part.begin_s == pytest.approx(whole.begin_s + 2.0)
     assert part.end_s == pytest.approx(whole.begin_s + 9.0)
+
+
+@pytest.mark.parametrize(("climb_mps", "edge_ft"), [(10.0, 5000.0), (-6.0, 10_000.0)])
+def test_an_ownship_that_comes_to_wider_limits_is_advised_from_there_on(climb_mps, edge_ft):
+    """0.45 nautical miles beside it: within 0.55 from 5,000 to 10,000 ft, not within 0.35 below.
+
+    Coming down from above 10,000 ft, where it is 0.80, the advisory is there from the start.
+    """
+    state = tuple(np.array([part, part]) for part in (0.45 * 1852.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    off_s = np.array([30.0, 70.0])
+    own_m = edge_ft * 0.3048 - climb_mps * off_s
+    span = tcas_span(
+        state, altitude_m=own_m, climb_mps=np.full(2, climb_mps), resolution=True, begin_s=0.5,
+        end_s=60.0,
+    )  # fmt: skip
+    if climb_mps > 0.0:
+        assert span.begin_s == pytest.approx([30.0, np.inf]) and span.end_s[0] == 60.0
+    else:
+        assert span.begin_s == pytest.approx([0.5, 0.5]) and (span.end_s == 60.0).all()
 
 
 def test_no_state_within_the_bounds_violates_outside_the_span():

@@ -254,6 +254,39 @@ def test_an_own_transponder_among_the_others_is_noticed(tmp_path):
     assert traffic([heard], own_file=str(own), without=["itself"]).roster.names == ("other",)
 
 
+@pytest.mark.parametrize(("step_s", "away"), [(2, True), (4, False), (1, True)])
+def test_a_silence_is_longer_than_ten_usual_steps_and_than_30_s(tmp_path, step_s, away):
+    """Silent for 36 s, heard before and after at every so many seconds."""
+    heard = [fix for fix in flight(seconds=121, step=step_s) if not 40 < fix[0] - START < 76]
+    block = traffic([gpx(tmp_path, own=flight(seconds=121), a=heard)])
+    assert block.targets.at(np.array([39.0, 60.0, 77.0])).present[:, 0].tolist() == [
+        True, not away, True
+    ]  # fmt: skip
+
+
+def test_who_is_beside_the_ownship_for_half_the_time_is_another(tmp_path):
+    """For 11 s at its place and then a kilometre away, or at its place for all but 11 s."""
+    for near_s, is_noted in ((11, False), (49, True)):
+        beside = [
+            (t, lat, lon + (0.0 if t - START < near_s else 0.05), alt)
+            for t, lat, lon, alt in flight()
+        ]
+        block = traffic([gpx(tmp_path, own=flight(), other=beside)])
+        assert any("stays within" in line for line in block.content.warnings) is is_noted
+
+
+def test_heights_of_several_kinds_are_said(tmp_path):
+    one, two = gpx(tmp_path, "one.gpx", a=flight()), tmp_path / "two.igc"
+    for pressure_m, kinds in ((None, {"geometric altitude"}), ([900] * 60, None)):
+        two.write_bytes(write.igc(flight(lat=47.1), pressure_m, name="b"))
+        content = traffic([one, two]).content
+        kinds = kinds or {"geometric altitude", "barometric altitude"}
+        assert content.height == ", ".join(sorted(kinds))
+        assert [w for w in content.warnings if "heights of several kinds" in w] == (
+            [f"heights of several kinds are flown together: {content.height}"] * (len(kinds) > 1)
+        )
+
+
 @covers("without", of=NAMES)
 def test_an_aircraft_is_left_out(tmp_path):
     path = gpx(tmp_path, a=flight(), b=flight(lat=47.1), c=flight(lat=47.2))
