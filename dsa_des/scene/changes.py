@@ -18,7 +18,7 @@ from itertools import combinations
 from math import lcm
 from typing import Any
 
-from dsa_des.block.component import Parameters, as_written
+from dsa_des.block.component import as_written
 from dsa_des.block.registry import section_models
 from dsa_des.errors import SceneError, did_you_mean, shown_value
 from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
@@ -186,7 +186,7 @@ def _why_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -> st
     return f"cannot change while a run lasts; {what} can change others{hint}"
 
 
-def may_change(*models: type[Parameters]) -> tuple[str, ...]:
+def may_change(*models: type[Any]) -> tuple[str, ...]:
     """Return which keys of tables may change while a run lasts, as their classes declare."""
     found = dict.fromkeys(
         name
