@@ -6,6 +6,7 @@ class of its geometry. The ratios themselves are taken over all runs of a cell.
 """
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class,
 from components.metrics.losses import meeting_deg, nominal_geometry
 from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import traffic_block
+from components.well_clear.missed_cylinder import Missed, led_into, widened
 from components.well_clear.plane_pairs import Meetings, meetings
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.scene.block_table import Block
@@ -89,11 +91,11 @@ _EVENTS = ("nmac", "well_clear_lost")
 _KEPT, _COMMANDED, _NEEDLESS = "well_clear_kept_nominal", "manoeuvred", "needless_manoeuvre"
 # What is expected of manoeuvres before any is seen: the chance that an event stays, that one comes
 # which the nominal flights just miss, and that a manoeuvre is flown where well clear is just kept.
-# Turns move the ownship by some `_TURNED_M` and hardly up or down, climbs by `_CLIMBED_M` and
-# hardly to the side (`_SLACK` of a size). Wrong ones cost width, never truth
-# (`dsa_des.studies.allocation`).
+# Wrong ones cost width, never truth (`dsa_des.studies.allocation`).
 _STAYS, _INDUCED, _NEEDS = 0.2, 0.004, 0.1
-_TURNED_M, _CLIMBED_M, _SLACK = 250.0, 100.0, 0.15
+# A conflict that is foreseen late surely stays. What is done about it in a hurry leads elsewhere
+# more often than what is done in time, by these factors.
+_LATE_S, _RUSHED, _IN_TIME = 35.0, 10.0, 0.3
 _LEAST_SIZES = 0.01
 # No sector of courses or bearings is so narrow, degrees.
 _WIDE_DEG = 35.0
@@ -120,7 +122,7 @@ class RiskRatios(Mitigated):
 
     Parameters = RiskRatioParameters
     geometry = (
-        "closest_s", "horizontal_miss_m", "vertical_miss_m", "relative_speed_mps",
+        "closest_s", "horizontal_miss_m", "vertical_miss_m", "relative_speed_mps", "foreseen_s",
         "course_along", "course_across", "bearing_ahead", "bearing_right",
         "log_miss_in_nmac_sizes", "log_miss_in_well_clear_sizes",
         *(expected_column(name) for name in (*(f"{e}_mitigated" for e in _EVENTS), _NEEDLESS)),
@@ -197,9 +199,11 @@ class RiskRatios(Mitigated):
         meeting, sizes_m = met_in_plane(group, self.p), self.p.sizes_m
         if meeting is None:
             result = self._of_nominal(group)
-            closest = self.of_flights(group, nominal_geometry, steered=False)
+            geometry = partial(nominal_geometry, widened(sizes_m))
+            closest, *misses_m = np.split(self.of_flights(group, geometry, steered=False), [7, 9])
         else:
             closest, result = meeting.closest, self._of_meeting(meeting)
+            misses_m = [meeting.beside_m, meeting.above_m]
             unsure = np.flatnonzero(meeting.unsure.any(axis=0) | self._between_classes(meeting))
             if len(unsure):
                 few = Group(group.scene, [group.replicas[k] for k in unsure.tolist()], (), {})
@@ -218,11 +222,15 @@ class RiskRatios(Mitigated):
         )
         for name, sizes in (("well_clear", clear), ("nmac", nmac)):
             result[f"log_miss_in_{name}_sizes"] = np.log(np.maximum(sizes, _LEAST_SIZES))
-        for event, limits in zip(("well_clear_lost", "nmac"), sizes_m, strict=True):
-            there = result[f"{event}_nominal"] > 0.0
-            induced = _INDUCED * led_into(limits, values[1], values[2], climbs=self._climbs)
-            result[expected_column(f"{event}_mitigated")] = np.where(there, _STAYS, induced)
+        late = np.nan_to_num(np.exp(-((result["foreseen_s"] / _LATE_S) ** 2)))
         kept = 1.0 - result["well_clear_lost_nominal"]
+        rushed = np.where(kept > 0.0, 1.0, _IN_TIME + (_RUSHED - _IN_TIME) * late)
+        for k, event in enumerate(("well_clear_lost", "nmac")):
+            there = result[f"{event}_nominal"] > 0.0
+            missed = Missed(values[1], values[2], misses_m[0][k], misses_m[1][k])
+            induced = _INDUCED * rushed * led_into(sizes_m[k], missed, climbs=self._climbs)
+            stays = _STAYS + (1.0 - _STAYS) * late
+            result[expected_column(f"{event}_mitigated")] = np.where(there, stays, induced)
         alone = np.maximum(np.nan_to_num(clear, nan=np.inf), 1.0)
         result[expected_column(_NEEDLESS)] = kept * _NEEDS * alone**-8.0
         return result
@@ -233,7 +241,7 @@ class RiskRatios(Mitigated):
 
     def _of_meeting(self, meeting: Meetings) -> dict[str, AnyArray]:
         """Return the same of paths in the plane, as far as these are sure."""
-        return _events_of(meeting) | self._named(*meeting.closest[4:])
+        return _events_of(meeting) | self._named(*meeting.closest[5:])
 
     def _between_classes(self, meeting: Meetings) -> BoolArray:
         """Return of which runs the plane does not tell the classes."""
@@ -285,22 +293,6 @@ def may_climb(block: Block) -> bool:
     return asked is None or bool(asked(block.parameters))
 
 
-def led_into(
-    size_m: tuple[float, float], level_m: FloatArray, up_m: FloatArray, *, climbs: bool
-) -> FloatArray:
-    """Return how likely it is that a manoeuvre leads into a cylinder that is just missed, to 1.
-
-    Of encounters that pass so far to the side and above; 0 where nobody is met.
-    """
-    limits = zip((level_m, up_m), size_m, strict=True)
-    level, up = (np.maximum(np.nan_to_num(at, nan=np.inf) - size, 0.0) for at, size in limits)
-    radius_m, half_m = size_m
-    turned = np.exp(-((level / _TURNED_M) ** 2) - (up / (_SLACK * half_m)) ** 2)
-    climbed = np.exp(-((level / (_SLACK * radius_m)) ** 2) - (up / _CLIMBED_M) ** 2)
-    result: FloatArray = np.maximum(turned, climbed) if climbs else turned
-    return result
-
-
 def side_of(bearing_deg: FloatArray) -> AnyArray:
     """Return in which sector of 90° each bearing lies: ahead, right, behind or left."""
     sector = np.floor((np.nan_to_num(bearing_deg) + 45.0) % 360.0 / 90.0).astype(int)
@@ -322,4 +314,4 @@ def met_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
     ):
         return None
     paths, end_s = pair_paths(encounters_of(group), one.dynamics), float(scene.duration_s or "inf")
-    return meetings(paths, len(group), end_s, p.sizes_m)
+    return meetings(paths, len(group), end_s, p.sizes_m, widened(p.sizes_m))

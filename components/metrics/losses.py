@@ -288,15 +288,20 @@ def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
     return angles
 
 
-def nominal_geometry(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return about how the nearest intruder of each run is met, (6, runs); NaN where none is.
+def nominal_geometry(
+    sizes_m: Sequence[tuple[float, float]], runs: Sequence[list[RelativeFlight]]
+) -> FloatArray:
+    """Return about how the nearest intruder of each run is met, (7 + 2 cylinders, runs).
 
     Time (s), horizontal and vertical distance (m) and relative speed in the level plane (m/s) at
-    the closest approach, then course and bearing (`meeting_deg`), degrees. Distances are looked at
-    every `_COARSE_S`: enough to choose runs by.
+    the closest approach, NaN for how long before it was foreseen, then course and bearing
+    (`meeting_deg`), degrees; NaN where none is met. Then how near any comes to the side while no
+    further up or down than each cylinder reaches, and up or down while no further to the side, m;
+    infinite where it never is. Distances are looked at every `_COARSE_S`: enough to choose by.
     """
     flights = [flight for run in runs for flight in run]
-    result = np.full((6, len(runs)), np.nan)
+    result = np.full((7 + 2 * len(sizes_m), len(runs)), np.nan)
+    result[7:] = np.inf
     if not flights:
         return result
     together = FlightsTogether(flights)
@@ -318,7 +323,12 @@ def nominal_geometry(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
     result[1, nearest.runs] = level_m[some, index[some]]
     result[2, nearest.runs] = up_m[some, index[some]]
     result[3, nearest.runs] = speed_mps
-    result[4:, nearest.runs] = _angles_deg(own_m, other_m)
+    result[5:7, nearest.runs] = _angles_deg(own_m, other_m)
+    of = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
+    for k, (radius_m, half_m) in enumerate(sizes_m):
+        for row, near, miss_m in ((0, up_m < half_m, level_m), (1, level_m < radius_m, up_m)):
+            found = np.where(near, miss_m, np.inf).min(axis=1)
+            np.minimum.at(result[7 + row * len(sizes_m) + k], of, found)
     return result
 
 

@@ -18,6 +18,8 @@ from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 _FARTHEST_M, _HIGHEST_M, _LONGEST_M = 50e3, 20e3, 10e3
 _EARTH_M = 6_371_000.0
 _MARGIN_M, _MARGIN = 1.5, 1e-3
+#: How far ahead conflicts are foreseen, s.
+_FORESEEN_S = 60.0
 #: Directions of slower flight are asked of the flights, and angles so close to an edge, degrees.
 _SLOW_MPS, _MARGIN_DEG = 0.5, 0.3
 
@@ -54,16 +56,21 @@ class PairPaths:
 class Meetings:
     """How the nearest intruder of each of many runs is met, by paths in the plane.
 
-    Time (s), horizontal and vertical distance (m), relative speed in the level plane (m/s), course
-    and bearing (degrees) at the closest approach, (6, runs), NaN where nobody is met. Whether any
+    Time (s), horizontal and vertical distance (m), relative speed in the level plane (m/s), for how
+    long before it was `foreseen` (s), course and bearing (degrees) at the closest approach, (7,
+    runs), NaN where nobody is met. Whether any
     intruder surely comes inside each of some cylinders, and whether that is `unsure`, (cylinders,
-    runs). Between which courses and bearings it may be, (2, 2, runs), degrees; and of which runs
-    that is unsure.
+    runs). How near any comes to the side (`beside_m`) while no further up or down than each of some
+    cylinders reaches, and how near up or down (`above_m`) while no further to the side, (cylinders,
+    runs); infinite where it never is. Between which courses and bearings it may be, (2, 2, runs),
+    degrees; and of which runs that is unsure.
     """
 
     closest: FloatArray
     inside: BoolArray
     unsure: BoolArray
+    beside_m: FloatArray
+    above_m: FloatArray
     angles_deg: FloatArray
     unsure_angles: BoolArray
 
@@ -73,15 +80,18 @@ def meetings(
     runs: int,
     end_s: float,
     sizes_m: Sequence[tuple[float, float]],
+    missed_m: Sequence[tuple[float, float]],
 ) -> Meetings:
     """Return how runs meet whose pairs come in blocks, each with the runs that they are of.
 
-    They are looked at from time 0 to `end_s`; cylinders are (radius, half height), m.
+    They are looked at from time 0 to `end_s`; cylinders are (radius, half height), m: as many that
+    somebody comes inside of, or that are missed.
     """
     inside, unsure = np.zeros((2, len(sizes_m), runs), dtype=np.bool_)
+    beside_m, above_m = np.full((2, len(missed_m), runs), np.inf)
     result = Meetings(
-        np.full((6, runs), np.nan), inside, unsure, np.full((2, 2, runs), np.nan),
-        np.zeros(runs, dtype=np.bool_),
+        np.full((7, runs), np.nan), inside, unsure, beside_m, above_m,
+        np.full((2, 2, runs), np.nan), np.zeros(runs, dtype=np.bool_),
     )  # fmt: skip
     parts: list[tuple[AnyArray, ...]] = []
     for number, of in paths:
@@ -90,11 +100,18 @@ def meetings(
             surely, maybe = pairs.inside(*limits)
             inside[k, number[surely]] = True
             unsure[k, number[maybe]] = True
-        parts.append((number, *pairs.closest()))
+        for k, limits in enumerate(missed_m):
+            for found, miss_m in zip((beside_m, above_m), pairs.misses_m(*limits), strict=True):
+                np.minimum.at(found[k], number, miss_m)
+        closest, *angles = pairs.closest()
+        foreseen_s = pairs.foreseen_s(*sizes_m[0], closest[0])
+        parts.append((number, np.insert(closest, 4, foreseen_s, axis=0), *angles))
     unsure &= ~inside
     if not parts:
         return result
-    number, closest, angles, vague = (np.concatenate(p, axis=-1) for p in zip(*parts, strict=True))
+    number, closest, angles_deg, vague = (
+        np.concatenate(p, axis=-1) for p in zip(*parts, strict=True)
+    )
     range_m = np.hypot(closest[1], closest[2])
     order = np.lexsort((range_m, number))
     number, range_m = number[order], range_m[order]
@@ -102,7 +119,7 @@ def meetings(
     met = first[~np.isnan(range_m[first])]
     which, pair = number[met], order[met]
     result.closest[:, which] = closest[:, pair]
-    result.angles_deg[:, :, which] = angles[:, :, pair]
+    result.angles_deg[:, :, which] = angles_deg[:, :, pair]
     result.unsure_angles[which] = vague[pair]
     # Of two that come as near, either may be the nearer one.
     close = (np.diff(number) == 0) & ~(range_m[1:] > range_m[:-1] + _slack_m(range_m[:-1]))
@@ -156,10 +173,38 @@ class PairsInPlane:
         surely &= ~self.beyond
         return surely, (maybe & ~surely) | self.beyond
 
+    def misses_m(self, horizontal_m: float, vertical_m: float) -> FloatArray:
+        """Return how near pairs come to the side while a cylinder's height apart or less, and up or
+        down while its radius apart or less, (2, pairs); infinite where they never are.
+        """
+        result = np.full((2, self._count), np.inf)
+        up = self._apart[2]
+        lowest, highest = np.minimum(up[:-1], up[1:]), np.maximum(up[:-1], up[1:])
+        step, pair = ((lowest < vertical_m) & (highest > -vertical_m)).nonzero()
+        apart, moved = self._apart[:, step, pair], self._moved[:, step, pair]
+        begin, end = _within_height(apart[2], moved[2], vertical_m)
+        squared = moved[0] ** 2 + moved[1] ** 2
+        part = -(apart[0] * moved[0] + apart[1] * moved[1])
+        part = part / np.where(squared > 0.0, squared, 1.0)
+        part = np.clip(part, np.maximum(begin, 0.0), np.minimum(end, 1.0))
+        north, east = apart[:2] + part * moved[:2]
+        np.minimum.at(result[0], pair, np.hypot(north, east))
+        nearest = np.minimum(self._level_m[:-1], self._level_m[1:]) - self._half_m
+        step, pair = (nearest < horizontal_m).nonzero()
+        apart, moved = self._apart[:, step, pair], self._moved[:, step, pair]
+        begin, end, crosses = _within_radius(apart, moved, horizontal_m)
+        begin, end = np.maximum(begin, 0.0), np.minimum(end, 1.0)
+        there = (crosses & (begin < end)).nonzero()[0]
+        ends = apart[2, there] + np.array([begin[there], end[there]]) * moved[2, there]
+        least = np.where(ends[0] * ends[1] < 0.0, 0.0, np.abs(ends).min(axis=0))
+        np.minimum.at(result[1], pair[there], least)
+        return result
+
     def closest(self) -> tuple[FloatArray, FloatArray, BoolArray]:
         """Return how pairs pass at the closest, from sample to sample in closed form.
 
-        Columns are those of `Meetings`: closest, between which angles, and where these are unsure.
+        Columns are those of `Meetings`, without what was foreseen: closest, between which angles,
+        and where these are unsure.
         """
         if not len(self._lasts_s):
             none = np.full((10, self._count), np.nan)
@@ -194,6 +239,23 @@ class PairsInPlane:
         slow = [np.hypot(*way) < _SLOW_MPS for way in (own, other, own - other)]
         vague[pair[np.any(slow, axis=0)]] = True
         return closest, between, vague
+
+    def foreseen_s(self, horizontal_m: float, vertical_m: float, until_s: FloatArray) -> FloatArray:
+        """Return for how long before some times straight flight on would have led into a cylinder.
+
+        So a conflict is told from `_FORESEEN_S` ahead, where sensors tell of it; one that comes by
+        a late turn is foreseen late.
+        """
+        apart, moved_mps = self._apart[:, :-1], self._moved / self._lasts_s[:, np.newaxis]
+        squared = moved_mps[0] ** 2 + moved_mps[1] ** 2
+        ahead_s = -(apart[0] * moved_mps[0] + apart[1] * moved_mps[1])
+        ahead_s = np.clip(ahead_s / np.where(squared > 0.0, squared, 1.0), 0.0, _FORESEEN_S)
+        north, east, up = apart + ahead_s * moved_mps
+        inside = (north**2 + east**2 < horizontal_m**2) & (np.abs(up) < vertical_m)
+        inside &= self._paths.time_s[:-1, np.newaxis] < until_s
+        each_s = np.where(inside, self._lasts_s[:, np.newaxis], 0.0)
+        # One after the other, so that a pair alone has the same bits as among many.
+        return each_s.cumsum(axis=0)[-1] if len(each_s) else np.full(self._count, np.nan)
 
     def _closest_on(self, step: IntArray, pair: IntArray) -> FloatArray:
         """Return time, horizontal and vertical distance and range, on the way from samples on."""
@@ -230,7 +292,19 @@ def _enters(
     apart: FloatArray, moved: FloatArray, horizontal_m: float, vertical_m: float
 ) -> BoolArray:
     """Return which straight ways from `apart` on, both (3, n), come inside a cylinder."""
-    north, east, up = apart
+    begin, end, crosses = _within_radius(apart, moved, horizontal_m)
+    low, high = _within_height(apart[2], moved[2], vertical_m)
+    first = np.maximum(np.maximum(begin, low), 0.0)
+    last = np.minimum(np.minimum(end, high), 1.0)
+    entered: BoolArray = crosses & (first < last)
+    return entered
+
+
+def _within_radius(
+    apart: FloatArray, moved: FloatArray, horizontal_m: float
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return from which to which part of straight ways they are within a radius; and if at all."""
+    north, east = apart[:2]
     a = moved[0] ** 2 + moved[1] ** 2
     b = north * moved[0] + east * moved[1]
     c = north**2 + east**2 - horizontal_m**2
@@ -239,13 +313,18 @@ def _enters(
     scale = np.where(moves, a, 1.0)
     begin = np.where(moves, (-b - root) / scale, np.where(c < 0.0, -np.inf, np.inf))
     end = np.where(moves, (-b + root) / scale, np.where(c < 0.0, np.inf, -np.inf))
-    climbs = moved[2] != 0.0
-    rate = np.where(climbs, moved[2], 1.0)
+    crosses: BoolArray = ~moves | (b * b > a * c)
+    return begin, end, crosses
+
+
+def _within_height(
+    up: FloatArray, climbed: FloatArray, vertical_m: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return from which to which part of straight ways they are within so much up or down."""
+    climbs = climbed != 0.0
+    rate = np.where(climbs, climbed, 1.0)
     edges = (-vertical_m - up) / rate, (vertical_m - up) / rate
     level = np.abs(up) < vertical_m
     low = np.where(climbs, np.minimum(*edges), np.where(level, -np.inf, np.inf))
     high = np.where(climbs, np.maximum(*edges), np.where(level, np.inf, -np.inf))
-    first = np.maximum(np.maximum(begin, low), 0.0)
-    last = np.minimum(np.minimum(end, high), 1.0)
-    entered: BoolArray = (~moves | (b * b > a * c)) & (first < last)
-    return entered
+    return low, high

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -216,13 +216,13 @@ class RatioTerms(NamedTuple):
     cluster: AnyArray
     #: For how many runs each one stands; None where all are flown.
     stands_for: FloatArray | None
+    #: What each was predicted before it was flown; None where nothing is.
+    predicted: FloatArray | None = None
 
     def of(self, some: IntArray | BoolArray) -> "RatioTerms":
         """Return those of some runs."""
-        rest = None if self.stands_for is None else self.stands_for[some]
-        return RatioTerms(
-            self.below[some], self.above[some], self.weight[some], self.cluster[some], rest
-        )
+        columns: list[Any] = [None if column is None else column[some] for column in self]
+        return RatioTerms(*columns)
 
 
 def ratio_difference(
@@ -237,14 +237,14 @@ def ratio_difference(
     much open as so many can. `alone` says how many runs only one condition has.
     """
     parts, ratios = [], []
-    for below, above, weight, _, some in (first, second):
+    for below, above, weight, _, some, predicted in (first, second):
         ratio = paired_ratio(
-            below, above, weight, cluster=first.cluster, stands_for=some, confidence=confidence,
-            method="delta",
+            below, above, weight, cluster=first.cluster, stands_for=some, predicted=predicted,
+            confidence=confidence, method="delta",
         )  # fmt: skip
         ratios.append(ratio)
         if not ratio.reason:
-            parts.append(influences(below, above, weight, ratio.ratio, some))
+            parts.append(influences(below, above, weight, ratio.ratio, some, predicted))
     if len(parts) < 2:
         none = Estimate(np.nan, np.nan, np.nan, 0, True)
         return EstimatedDifference(none, none, *alone)

@@ -367,6 +367,11 @@ def geometry_column(name: str) -> str:
     return f"geometry.{name}"
 
 
+def predicted_column(event: str) -> str:
+    """Return the name, among those of geometry, of what an event counts before a run is flown."""
+    return f"predicted.{event}"
+
+
 def draw_column(key: str) -> str:
     """Return the column of a drawn value."""
     return f"draw.{key.removeprefix('blocks.')}"

@@ -32,6 +32,8 @@ from dsa_des.results.record import (
     STANDS_FOR,
     TRIALS,
     Result,
+    geometry_column,
+    predicted_column,
 )
 from dsa_des.results.statistics import (
     Estimate,
@@ -190,6 +192,11 @@ class Rows:
             result = taken_over(result, lost, self.column("cell") == cell)
         return result
 
+    def predicted(self, event: str, rows: IntArray) -> FloatArray | None:
+        """Return with what an event counts in some rows before they are flown, if with anything."""
+        name = geometry_column(predicted_column(event))
+        return np.nan_to_num(self.column(name)[rows]) if name in self.stored.names else None
+
     def is_sampled(self, name: str) -> bool:
         """Return whether only runs that were flown have a result."""
         if self.stands_for is None:
@@ -280,7 +287,8 @@ class Rows:
         known = ~np.isnan(values) | (stands_for == 0.0)
         ratio = paired_ratio(
             np.ones(int(known.sum())), values[known], cluster=self.units[rows][known],
-            stands_for=stands_for[known], confidence=confidence,
+            stands_for=stands_for[known], predicted=self.predicted(result.name, rows[known]),
+            confidence=confidence,
         )  # fmt: skip
         low, high = ratio.interval
         ratio = replace(ratio, interval=(low, min(high, 1.0)))
@@ -294,11 +302,11 @@ class Rows:
         Runs of the same encounter, and of the same unit, hang together.
         """
         terms, used, missing = self._paired(result, rows)
-        below, above, weight, cluster, stands_for = terms
+        below, above, weight, cluster, stands_for, predicted = terms
         method = "bootstrap" if method == "bootstrap" else "gamma"
         together = cluster if len(np.unique(cluster)) < len(used) else None
         ratio = paired_ratio(
-            below, above, weight, cluster=together, stands_for=stands_for,
+            below, above, weight, cluster=together, stands_for=stands_for, predicted=predicted,
             confidence=confidence, method=method, resamples=_RESAMPLES,
         )  # fmt: skip
         if result.ratio is not None and result.ratio.share:
@@ -326,7 +334,8 @@ class Rows:
             if self.over:  # one encounter's number means another in another file
                 _, number = np.unique(cluster, return_inverse=True)
                 cluster = units * (int(number.max(initial=0)) + 1) + number
-        terms = RatioTerms(below, above, weight, cluster, stands_for).of(known)
+        predicted = self.predicted(of.above, rows)
+        terms = RatioTerms(below, above, weight, cluster, stands_for, predicted).of(known)
         return terms, rows[known], int((~known).sum())
 
     def ratio_difference(

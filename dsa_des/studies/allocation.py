@@ -4,18 +4,21 @@ A study of a ratio knows of every run what happens without a remedy, and its geo
 twentieth of the cost of flying it with one. A run is flown with a probability π(x) of its own and
 stands for 1/π runs (`dsa_des.results.ratio`). π follows from the chance p(x) of each event: in the
 first round, of `PILOT` runs, from what metrics expect; then from a logistic model beside it, learnt
-from all that was flown before. A wrong p(x) costs width, never truth. With weights w and nominal
-flags n the variance of a ratio R is that of Σ w (m/π - R n), of which only Σ w² p/π depends on π;
-so with costs c of knowing and 1 of flying
+from all that was flown before. An event that was seen often enough is *predicted*: every run counts
+with a chance that was learnt from other runs, and those flown correct it. A wrong p(x) costs width,
+never truth. With weights w and nominal flags n the variance of a ratio R is that of
+Σ w (m/π - R n), or of Σ w (p + (m - p)/π - R n) with a prediction, of which only Σ w² q/π depends
+on π, with q = p, or q = p (1 - p); so with costs c of knowing and 1 of flying
 
-    π ∝ w √(Σ_e p_e / V_e),   of the size that makes  Σ_e V_e(π) / V_e · (Σ π + N c)  least,
+    π ∝ w √(Σ_e q_e / V_e),   of the size that makes  Σ_e V_e(π) / V_e · (Σ π + N c)  least,
 
 V_e being the variance of event e with every run flown. It is Neyman's rule for a sample in two
-phases (J. Neyman, "Contribution to the theory of sampling human populations", Journal of the
-American Statistical Association 33, 1938; C.-E. Särndal, B. Swensson & J. Wretman, "Model assisted
-survey sampling", 1992, chapter 9). No π is below `LEAST`, and in the first round below
-`FIRST_LEAST`: what nobody expects must be seen too, and weighs 1/π then. Rounds are few, because
-each flies a lock step of its own, whose windows cost as much as a thousand runs.
+phases, with the difference estimator where events are predicted (J. Neyman, "Contribution to the
+theory of sampling human populations", Journal of the American Statistical Association 33, 1938;
+C.-E. Särndal, B. Swensson & J. Wretman, "Model assisted survey sampling", 1992, chapters 6 and 9).
+No π is below `LEAST`, and in the first round below `FIRST_LEAST`: what nobody expects must be seen
+too, and weighs 1/π then. Rounds are few, because each flies a lock step of its own, whose windows
+cost as much as a thousand runs.
 
 Pure functions of arrays; which columns they are is said by `dsa_des.studies.foreseen`.
 """
@@ -38,6 +41,10 @@ LEAST, FIRST_LEAST = 0.02, 0.3
 _WORTH_IT = 0.8
 #: The chance that is expected of an event of which nothing is told.
 UNTOLD = 0.05
+#: An event is predicted once it was seen so often. With fewer a ratio could come out negative.
+PREDICTED_FROM = 50
+# A prediction is never taken for surer than that.
+_SUREST = 0.95
 # Standard deviations of the model's coefficients before anything is flown: of the level, of how far
 # what is expected is believed, and for one standard deviation of geometry, or its square.
 _LEVEL_SD, _BELIEF_SD, _SLOPE_SD = 3.0, 0.5, 0.25
@@ -72,8 +79,10 @@ class Allocation:
     coefficients: FloatArray
     #: 1 / V of each event, (events,).
     precision: FloatArray
-    #: How much π is for each w √(Σ p/V); infinite where all are flown.
+    #: How much π is for each w √(Σ q/V); infinite where all are flown.
     size: float
+    #: Which events are predicted.
+    predicted: BoolArray
     #: The least probability.
     least: float = LEAST
     #: Of the runs it was learnt from, so many would be flown.
@@ -81,8 +90,13 @@ class Allocation:
 
     def probabilities(self, runs: ForeseenRuns) -> FloatArray:
         """Return the probability with which each run is flown, (runs,)."""
-        worth = np.sqrt(_combined(self.precision, self._chances(runs)))
+        left = left_open(self._chances(runs), self.predicted)
+        worth = np.sqrt(_combined(self.precision, left))
         return flown_with(runs.weight * worth, self.size, self.least)
+
+    def predictions(self, runs: ForeseenRuns) -> FloatArray:
+        """Return with what each event counts before a run is flown, (events, runs)."""
+        return np.where(self.predicted[:, np.newaxis], self._chances(runs), 0.0)
 
     def _chances(self, runs: ForeseenRuns) -> FloatArray:
         terms = model_terms(self._scaled(runs.geometry), runs.nominal)
@@ -99,6 +113,12 @@ def flown_with(worth: FloatArray, size: float, least: float) -> FloatArray:
         return np.ones(len(worth))
     result: FloatArray = np.clip(size * worth, least, 1.0)
     return result
+
+
+def left_open(chance: FloatArray, predicted: BoolArray) -> FloatArray:
+    """Return what of the variance of events, (events, runs), hangs on how often they are flown."""
+    sure = np.clip(chance, None, _SUREST)
+    return np.where(predicted[:, np.newaxis], sure * (1.0 - sure), chance)
 
 
 def model_terms(scaled: FloatArray, nominal: FloatArray) -> FloatArray:
@@ -153,30 +173,34 @@ def learn(
             some = flown & ((n > 0.0) == having)
             weight = stands_for[some] / stands_for[some].mean() if some.any() else np.empty(0)
             fitted[event, having] = fit_chances(terms[:, some], e[some], m[some], weight)
-    precision, size = best_size(runs, chances(terms, runs, fitted), least)
-    plan = Allocation(middle, spread, fitted, precision, size, least)
+    predicted = np.where(flown, happened, 0.0).sum(axis=1) >= PREDICTED_FROM
+    precision, size = best_size(runs, chances(terms, runs, fitted), predicted, least)
+    plan = Allocation(middle, spread, fitted, precision, size, predicted, least)
     return replace(plan, share=float(plan.probabilities(runs).mean()))
 
 
-def best_size(runs: ForeseenRuns, chance: FloatArray, least: float) -> tuple[FloatArray, float]:
+def best_size(
+    runs: ForeseenRuns, chance: FloatArray, predicted: BoolArray, least: float
+) -> tuple[FloatArray, float]:
     """Return 1/V of each event, and the size of π with the least variance times cost."""
     w, n = runs.weight, runs.nominal
     below = (w * n).sum(axis=1)
     there = below > 0.0
     ratio = np.where(there, (w * chance).sum(axis=1) / np.where(there, below, 1.0), 0.0)[:, None]
-    fixed = (w**2 * (ratio**2 * n - 2.0 * ratio * chance * n)).sum(axis=1)
-    all_flown = (w**2 * chance).sum(axis=1) + fixed
+    left = left_open(chance, predicted)
+    fixed = (w**2 * (chance - left + ratio**2 * n - 2.0 * ratio * chance * n)).sum(axis=1)
+    all_flown = (w**2 * left).sum(axis=1) + fixed
     counts = there & (all_flown > 0.0)
     precision = np.where(counts, 1.0 / np.where(counts, all_flown, 1.0), 0.0)
     if not counts.any():
         return precision, np.inf
-    gone = _combined(precision, chance)
-    worth = w * np.sqrt(gone)
+    open_ = _combined(precision, left)
+    worth = w * np.sqrt(open_)
     scale = 1.0 / max(float(worth.max()), 1e-300)
     costs = []
     for size in _SIZES * scale:
         pi = flown_with(worth, size, least)
-        variance = float((w**2 * gone / pi).sum() + precision @ fixed)
+        variance = float((w**2 * open_ / pi).sum() + precision @ fixed)
         costs.append(variance * (float(pi.mean()) + FORESEEN_COST))
     best = int(np.argmin(costs))
     # Flying all tells the nominal runs by the way.

@@ -41,7 +41,7 @@ from dsa_des.results.record import (
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Allocation
-from dsa_des.studies.foreseen import foresee_all, geometry_of, stands_for
+from dsa_des.studies.foreseen import chosen, foresee_all, geometry_of
 from dsa_des.studies.metric import Group, Metric, no_values, one_by_one, wanted_by
 from dsa_des.studies.splitting import Nearness, SplitEvent, split
 from dsa_des.studies.study import Chunk, Study, set_text
@@ -249,18 +249,18 @@ def _run_cell(
     for k, text in errors.items():
         rows["error"][k] = text
     results = [result for metric in metrics for result in metric.results()]
-    shares = stands_for(study, cell, numbers, plan, results, known)
-    chosen = [k for k in np.flatnonzero(shares).tolist() if k not in errors]
-    wrong: list[str | None] = [None] * len(chosen)
-    some = [replicas[k] for k in chosen]
-    flown = _flown(scene, metrics, some, wrong, key, of[chosen], undone)
-    for k, said in zip(chosen, wrong, strict=True):
+    shares, predicted = chosen(study, cell, numbers, plan, results, known)
+    these = [k for k in np.flatnonzero(shares).tolist() if k not in errors]
+    wrong: list[str | None] = [None] * len(these)
+    some = [replicas[k] for k in these]
+    flown = _flown(scene, metrics, some, wrong, key, of[these], undone)
+    for k, said in zip(these, wrong, strict=True):
         rows["error"][k] = said
     values = {}
     for name, column in flown.items():
         values[name] = no_values(len(numbers), text=column.dtype == object)
-        values[name][chosen] = column
-    return _table(study, schema, cell, rows, values | known | {STANDS_FOR: shares})
+        values[name][these] = column
+    return _table(study, schema, cell, rows, values | known | predicted | {STANDS_FOR: shares})
 
 
 def _flown(

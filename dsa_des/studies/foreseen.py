@@ -15,7 +15,15 @@ from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.foreign_calls import error_text, must_pass
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.record import EVENT, RATIO, STANDS_FOR, RatioOf, Result, geometry_column
+from dsa_des.results.record import (
+    EVENT,
+    RATIO,
+    STANDS_FOR,
+    RatioOf,
+    Result,
+    geometry_column,
+    predicted_column,
+)
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import (
@@ -37,8 +45,10 @@ _AT_ONCE = 4096
 
 
 def geometry_of(metrics: Sequence[Metric]) -> list[str]:
-    """Return the names of all numbers by which metrics tell runs apart before they are flown."""
-    return list(dict.fromkeys(name for metric in metrics for name in metric.geometry))
+    """Return the names of all numbers by which runs are told apart before they are flown."""
+    names = dict.fromkeys(name for metric in metrics for name in metric.geometry)
+    ratios = [one.ratio for metric in metrics for one in metric.results() if one.ratio is not None]
+    return [*names, *dict.fromkeys(predicted_column(of.above) for of in ratios if names)]
 
 
 def why_not_foreseen(study: Study, scene: Scene) -> str:
@@ -103,30 +113,36 @@ def foresee_all(
     return one_by_one(partial(foresee_all, scene, metrics), replicas)
 
 
-def stands_for(
+def chosen(
     study: Study,
     cell: int,
     numbers: Sequence[int],
     plan: Allocation | None,
     results: Sequence[Result],
     columns: Mapping[str, AnyArray],
-) -> FloatArray:
-    """Return for how many runs each one stands, 0 where it is not flown, (runs,).
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Return for how many runs each one stands, 0 where it is not flown, (runs,); and predictions.
 
     Whether a run is flown depends on its seed and on what is known of it, and on no other run.
     """
     if plan is None or not columns:  # nothing is known of runs that are all in error
-        return np.ones(len(numbers))
+        return np.ones(len(numbers)), {}
     ratios = [one.ratio for one in ratios_of(results, study.allocate) if one.ratio is not None]
     seed = study.member_seed(cell)
     draws = [uniform(seed, "study allocation", number) for number in numbers]
-    return drawn(plan.probabilities(_known(columns, ratios)), draws)[1]
+    known = _known(columns, ratios)
+    predicted: dict[str, FloatArray] = {}
+    for of, chance in zip(ratios, plan.predictions(known), strict=True):
+        name = geometry_column(predicted_column(of.above))
+        predicted[name] = np.maximum(predicted.get(name, 0.0), chance)
+    return drawn(plan.probabilities(known), draws)[1], predicted
 
 
 def _known(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> ForeseenRuns:
     chances = [geometry_column(expected_column(of.above)) for of in ratios]
     names = sorted(name for name in columns if name.startswith(geometry_column("")))
-    geometry = [columns[n] for n in names if not n.startswith(geometry_column(expected_column("")))]
+    chance = tuple(geometry_column(of("")) for of in (expected_column, predicted_column))
+    geometry = [columns[name] for name in names if not name.startswith(chance)]
     weights = [np.ones(len(geometry[0])) if of.weight is None else columns[of.weight]
                for of in ratios]  # fmt: skip
     return ForeseenRuns(

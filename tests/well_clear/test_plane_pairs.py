@@ -107,17 +107,17 @@ def test_the_closest_approach_lies_between_samples_and_its_angles_are_those_of_t
     head_on = ((10_000.0, 200.0, 1030.0), (-70.0, 0.0, 0.0))
     # From the right, through the ownship's place at 30 s.
     crossing = ((1500.0, 1800.0, 1000.0), (0.0, -60.0, 0.0))
-    met = meetings([(np.array([0, 1]), straight(head_on, crossing))], 3, 100.0, SIZES_M)
+    met = meetings([(np.array([0, 1]), straight(head_on, crossing))], 3, 100.0, SIZES_M, SIZES_M)
     assert met.closest[0, :2] == pytest.approx([10_000 / 120, 30.0])
     assert met.closest[1, :2] == pytest.approx([200.0 * (1 + 1030 / 6_371_000), 0.0], abs=1e-6)
     assert met.closest[2, :2] == pytest.approx([30.0, 0.0], abs=1e-6)
     assert met.closest[3, :2] == pytest.approx([120.0, np.hypot(50, 60)])
-    assert met.closest[4, :2] == pytest.approx([180.0, 270.0])
-    assert met.closest[5, :2] == pytest.approx([0.0, np.degrees(np.arctan2(60, 50))])
+    assert met.closest[5, :2] == pytest.approx([180.0, 270.0])
+    assert met.closest[6, :2] == pytest.approx([0.0, np.degrees(np.arctan2(60, 50))])
     assert np.isnan(met.closest[:, 2]).all() and not met.unsure[:, 2].any()
     assert met.inside.tolist() == [[True, True, False], [False, True, False]]
     # A run that ends before sees only what comes until then.
-    early = meetings([(np.array([0, 1]), straight(head_on, crossing))], 2, 25.0, SIZES_M)
+    early = meetings([(np.array([0, 1]), straight(head_on, crossing))], 2, 25.0, SIZES_M, SIZES_M)
     assert early.closest[0] == pytest.approx([25.0, 25.0])
     assert early.inside.tolist() == [[False, True], [False, False]]
 
@@ -126,12 +126,38 @@ def test_of_several_intruders_the_nearest_counts_and_events_are_anyones() -> Non
     far_below = ((1500.0, 1800.0, 1100.0), (0.0, -60.0, 0.0))
     nearer = ((10_000.0, 50.0, 1000.0), (-70.0, 0.0, 0.0))
     blocks = [(np.array([1]), straight(far_below)), (np.array([1, 0]), straight(nearer, far_below))]
-    met = meetings(blocks, 2, 100.0, SIZES_M)
-    assert met.closest[4].tolist() == pytest.approx([270.0, 180.0])
+    met = meetings(blocks, 2, 100.0, SIZES_M, SIZES_M)
+    assert met.closest[5].tolist() == pytest.approx([270.0, 180.0])
     assert met.inside.tolist() == [[True, True], [False, True]]
     assert not met.unsure_angles.any()
     twice = [(np.array([0]), straight(nearer)), (np.array([0]), straight(nearer))]
-    assert meetings(twice, 1, 100.0, SIZES_M).unsure_angles.all()
+    assert meetings(twice, 1, 100.0, SIZES_M, SIZES_M).unsure_angles.all()
+
+
+def test_how_a_cylinder_is_missed_beside_it_and_above_by_hand() -> None:
+    """Head-on 200 m to the side at 120 m/s; 600 m above at first, and 10 m/s down."""
+    wider = 1 + 1030 / 6_371_000
+    descends = ((10_000.0, 200.0, 1600.0), (-70.0, 0.0, -10.0))
+    above_all = ((10_000.0, 200.0, 1600.0), (-70.0, 0.0, 0.0))
+    behind = ((-10_000.0, 0.0, 1000.0), (50.0, 0.0, 0.0))
+    pairs = PairsInPlane(straight(descends, above_all, behind))
+    beside_m, above_m = pairs.misses_m(670.56, 30.48)
+    # Within 30.48 m of the same altitude until 63.05 s; within the radius from 78.0 s on.
+    assert beside_m[0] == pytest.approx(np.hypot(10_000 - 120 * 63.048, 200.0) * wider, rel=1e-3)
+    assert above_m[0] == pytest.approx((10_000 - np.sqrt(670.56**2 - 200**2)) / 12 - 600, abs=0.2)
+    assert beside_m[1] == np.inf and above_m[1] == pytest.approx(600.0)
+    assert beside_m[2] == pytest.approx(10_000.0, rel=1e-3) and above_m[2] == np.inf
+
+
+def test_a_conflict_is_foreseen_a_minute_ahead_and_a_late_turn_late() -> None:
+    """60 s of straight flight lead within 670 m from 18.0 s on; samples are 10 s apart."""
+    head_on = ((10_000.0, 200.0, 1030.0), (-70.0, 0.0, 0.0))
+    passes = ((10_000.0, 900.0, 1030.0), (-70.0, 0.0, 0.0))
+    paths = straight(head_on, passes)
+    paths.other_m[1, 7:, 1] = 200.0  # it comes over between 60 and 70 s
+    met = meetings([(np.array([0, 1]), paths)], 2, 100.0, SIZES_M, SIZES_M)
+    # From 20 s on, and from when it comes over, until they are closest after 83 s.
+    assert met.closest[4].tolist() == [70.0, 30.0]
 
 
 def test_pairs_are_inside_where_closely_spaced_places_on_their_ways_are() -> None:

@@ -10,7 +10,8 @@ from wired import sensor
 
 import dsa_des
 from components.encounters import risk_metric
-from components.encounters.risk_metric import led_into, may_climb
+from components.encounters.risk_metric import may_climb
+from components.well_clear.missed_cylinder import Missed, led_into
 from dsa_des.block.registry import find
 from dsa_des.studies.foreseen import foresee
 from dsa_des.studies.study_file import read_study
@@ -81,6 +82,10 @@ def test_the_plane_and_the_flights_give_the_same(
     for name, most in (("closest_s", 0.51), ("vertical_miss_m", 5.0)):
         apart = np.abs(in_plane[f"geometry.{name}"] - flown[f"geometry.{name}"])
         assert np.quantile(apart, 0.9) < most
+    kept = in_plane["well_clear_lost_nominal"] == 0.0
+    expected = "geometry.expected.well_clear_lost_mitigated"
+    apart = np.abs(in_plane[expected] - flown[expected])[kept]
+    assert np.quantile(apart, 0.9) < 0.0004 and in_plane[expected][kept].max() > 0.001
 
 
 def test_a_set_of_many_gives_each_encounter_as_alone(tmp_path: Path) -> None:
@@ -110,14 +115,19 @@ def test_a_set_of_many_gives_each_encounter_as_alone(tmp_path: Path) -> None:
             assert one.coefficients.tobytes() == other.coefficients.tobytes()
 
 
-def test_turns_lead_to_the_side_and_climbs_up_or_down() -> None:
-    nmac, e = (152.4, 30.48), np.exp(-1.0)
-    level_m = np.array([100.0, 402.4, 152.4, 152.4, np.nan])
-    up_m = np.array([10.0, 30.0, 130.48, 30.48 * 1.15, np.nan])
-    turned = led_into(nmac, level_m, up_m, climbs=False)
-    assert turned == pytest.approx([1.0, e, 0.0, e, 0.0], abs=1e-12)
-    climbed = led_into(nmac, level_m, up_m, climbs=True)
-    assert climbed[:3] == pytest.approx([1.0, e, e]) and climbed[4] == 0.0
+def test_turns_lead_to_the_side_at_the_same_altitude_and_climbs_up_or_down() -> None:
+    """Of 152.4 m and 30.48 m: met inside, beside it, at another time, above and never."""
+    e, never = np.exp(-1.0), np.inf
+    missed = Missed(
+        level=np.array([100.0, 502.4, 152.4, 100.0, np.nan]),
+        up=np.array([10.0, 100.0, 60.96, 130.48, np.nan]),
+        beside=np.array([100.0, 502.4, 5000.0, never, never]),
+        above=np.array([10.0, never, 60.0, 130.48, never]),
+    )
+    turned = led_into((152.4, 30.48), missed, climbs=False)
+    assert turned == pytest.approx([1.0, e, e, 0.0, 0.0], abs=1e-12)
+    climbed = led_into((152.4, 30.48), missed, climbs=True)
+    assert climbed[[0, 1, 3, 4]] == pytest.approx([1.0, e, e, 0.0])
 
 
 @pytest.mark.parametrize(
