@@ -15,6 +15,7 @@ from pydantic_core import PydanticUndefined
 from dsa_des.block.registry import section_models
 from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
 from dsa_des.scene.changes import may_change
+from dsa_des.scene.outages import Outage
 
 _UNITS = {
     "hz": "Hz", "s": "s", "ms": "ms", "m": "m", "km": "km", "deg": "deg", "rad": "rad",
@@ -132,6 +133,7 @@ SCENE: tuple[Row, ...] = (
     ("blocks", "tables", "", "required", "One table for each block, by its name."),
     ("wires", "list", "", "[]", "Who sends to whom: texts or tables."),
     ("processors", "tables", "", "-", "Shared processors, by name."),
+    ("outages", "list of tables", "", "[]", "Blocks that fail at random, and are repaired."),
     (
         "changes",
         "list of tables",
@@ -182,6 +184,7 @@ def scene_tables() -> Mapping[str, tuple[str, Callable[[], list[Row]]]]:
             lambda: _rows_of(BlockOptions),
         ),
         "wires": ("Keys of an item of `wires`.", lambda: list(WIRES)),
+        "outages": ("Keys of an item of `outages`.", lambda: _rows_of(Outage)),
         "changes": ("Keys of an item of `changes`.", lambda: list(CHANGES)),
         "processors": ("Keys of [processors.NAME].", lambda: _rows_of(ProcessorParameters)),
     }

@@ -167,6 +167,8 @@ def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
         )
     for change in loaded.changes:
         say(f"  {change.sentence()}")
+    for outage in loaded.outages:
+        say(f"  {outage.sentence()}")
 
 
 _WIDE = 300

@@ -296,6 +296,7 @@ def _check_alike(scenes: Sequence[Scene]) -> None:
             and scene.duration_s == first.duration_s
             and scene.ticks_per_s == first.ticks_per_s
             and scene.classes == first.classes
+            and scene.outages == first.outages
             and all(scene.sections[name] == model for name, model in first.sections.items())
         )
         if not same:

@@ -29,6 +29,7 @@ from dsa_des.running.channel import Channel, Inputs
 from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
 from dsa_des.running.processors import Processor
 from dsa_des.running.windows import Window
+from dsa_des.stretches.outages import Outages
 from dsa_des.stretches.stretched_block import StretchedBlock
 from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.run_clock import RunClock
@@ -90,6 +91,8 @@ class Node:
     runner: Any = None
     #: Its instances in each stretch of time, where it changes while it runs.
     stretched: StretchedBlock | None = None
+    #: When it is out, where it fails at random.
+    outages: Outages | None = None
     #: Whether it may run ahead of the window (`Window.ahead`).
     ahead: bool = False
 
@@ -161,11 +164,13 @@ class Node:
     def undone(self) -> Mapping[str, IntArray]:
         """Return in which runs it never ran, as counts (2, runs), where there are any."""
         idle = self._idle_runs()
+        out = {} if self.outages is None else self.outages.undone()
         if self.component.process is not None or not idle.any():
-            return {}
+            return out
         ports = [name for name in self.channels if self.component.inputs[name].held]
         why = f", for nothing came at {' and '.join(sorted(ports))}" if ports else ""
-        return {f"it never ran{why}": np.array([idle, np.ones(len(idle))], dtype=np.int64)}
+        never = np.array([idle, np.ones(len(idle))], dtype=np.int64)
+        return {f"it never ran{why}": never, **out}
 
     def _idle_runs(self) -> BoolArray:
         ran, runs = self._ran, self.simulation.runs.count
@@ -304,11 +309,18 @@ class Node:
         self, instants: RunTicks, scans: IntArray, end: int, idle: BoolArray | None = None
     ) -> None:
         before = None if self.clock is None else self.clock.before
+        if self.outages is not None and not (up := self.outages.up(instants)).all():
+            instants, scans = instants.take(up), scans[up]
+            idle = None if idle is None else idle[up]
+            if not len(instants):
+                return
         wake = self._inputs.seen(
             instants, scans, end, self._rows_asked_for, clock=before, idle=idle
         )
         if wake is None:
             return
+        if self.outages is not None:
+            wake = self.outages.heard(wake)
         ticks = wake.ticks
         if not self._all_ran:
             self._ran = ~self._idle_runs()

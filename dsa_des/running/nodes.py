@@ -47,6 +47,7 @@ def build_nodes(
         node.pulse = timeline.pulse(component)
         node.processor = processors.get(scene.blocks[name].options.processor or "")
         node.ahead = name in grain.ahead
+        node.outages = timeline.outages(name)
         node.on_demand = component.clocked == "demand" and node.clock is None
         nodes[name] = node
     return nodes

@@ -19,6 +19,7 @@ from dsa_des.running.grain import Grain, grain_of
 from dsa_des.running.windows import Rewinder, RewindingWindows, Windows
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
+from dsa_des.stretches.outages import Outages
 from dsa_des.stretches.stretched_block import StretchedBlock
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
@@ -122,6 +123,13 @@ class Timeline:
         """The first tick of each stretch of the scene."""
         instants_s = [Fraction(0), *(stretch.from_s for stretch in self.scene.stretches)]
         return np.array([t * self.scene.ticks_per_s for t in instants_s], dtype=np.int64)
+
+    def outages(self, name: str) -> Outages | None:
+        """Return when a block is out, or None where it never is."""
+        failing = [one for one in self.scene.outages if name in one.blocks]
+        if not failing:
+            return None
+        return Outages(failing, self.streams, self.runs, self.scene.ticks_per_s)
 
     def stretched(self, instances: Sequence[Component]) -> StretchedBlock | None:
         """Return what handles the wakes of a block in each stretch; None where one does in all."""

@@ -38,6 +38,7 @@ from dsa_des.scene.checks import (
 )
 from dsa_des.scene.graph import build_graph, check_graph
 from dsa_des.scene.keys import Key, dotted, key_in
+from dsa_des.scene.outages import OUTAGES, Outage, read_outages
 from dsa_des.scene.overrides import (
     IN_SET,
     IN_SWAP,
@@ -53,7 +54,7 @@ from dsa_des.text.safe_text import printable, shortened
 from dsa_des.time.randomness import Streams
 
 _TOP_LEVEL = (
-    "title", "description", "duration_s", "seed", "blocks", "wires", "processors", CHANGES,
+    "title", "description", "duration_s", "seed", "blocks", "wires", "processors", CHANGES, OUTAGES,
 )  # fmt: skip
 _TOLERANCE = "accuracy"
 # Of what a scene is shown as in Python.
@@ -91,6 +92,8 @@ class Scene:
         What changes while a run lasts.
     stretches : list of Stretch
         What the scene is after each instant at which something changes; none where nothing does.
+    outages : list of Outage
+        Which blocks fail at random.
     """
 
     path: Path
@@ -108,6 +111,7 @@ class Scene:
     notes: list[str] = field(default_factory=list)
     changes: list[TimedChange] = field(default_factory=list)
     stretches: list[Stretch] = field(default_factory=list)
+    outages: list[Outage] = field(default_factory=list)
     #: What is in the file that it was made of, where that is no scene.
     about: list[str] = field(default_factory=list)
     #: The tables it was made of, changes included.
@@ -259,6 +263,9 @@ class Scene:
                 tables[name] = values
         if self.changes:
             tables[CHANGES] = [change.written() for change in self.changes]
+        if self.outages:
+            written = (one.model_dump(mode="json", exclude_none=True) for one in self.outages)
+            tables[OUTAGES] = list(written)
         if self.processors:
             tables["processors"] = {
                 name: parameters.model_dump(mode="json")
@@ -376,6 +383,7 @@ def check_scene(scene_file: SceneFile) -> Scene:
         notes=notes,
     )
     scene._tables = scene_file
+    scene.outages = read_outages(scene_file, classes, duration)
     if CHANGES in data:
         scene.changes = read_timed_changes(scene_file, classes)
         scene.stretches = stretches_of(scene_file, scene, scene.changes, check_scene)

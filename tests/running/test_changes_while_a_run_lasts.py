@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pyarrow as pa
 import pytest
+from covering import covers
 from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 
 import dsa_des
@@ -90,6 +91,8 @@ def inside(time_s):
     return (time_s >= 13) & (time_s < 27)
 
 
+@covers("changes", of=("[scene]",))
+@covers("from_s", "to_s", "set", of=("[changes]",))
 @pytest.mark.parametrize(
     ("key", "value"),
     [
@@ -121,6 +124,7 @@ def scans_of(table):
     return np.round(table["time_s"].to_numpy(), 9).tolist()
 
 
+@covers("at_s", of=("[changes]",))
 def test_a_clock_of_a_new_rate_counts_from_the_change_on():
     key = "blocks.radar.scan_rate_hz"
     lasts = scene(change(key, 4, at_s=1.1), {"at_s": 2, "set": {key: 0.5}}, duration_s=7)
