@@ -185,6 +185,18 @@ def test_levels_of_tcas(tmp_path):
             assert a == b or float(a) == pytest.approx(float(b), abs=1e-9)
 
 
+@pytest.mark.parametrize(("feet", "level"), [(900.0, 1), (1100.0, 2), (5200.0, 2)])
+def test_below_1000_feet_tcas_advises_of_no_resolution(tmp_path, feet, level):
+    """Head on at 80 m/s from 1,000 m, within both times at any height; levels go by the own one."""
+    cell = [np.full((1, 1), part) for part in (0.0, -1000.0, 0.0, 0.0, -80.0, 0.0)]
+    relative = (*(-part for part in cell[:3]), *cell[3:])
+    own = State(*(np.full((1, 1), part) for part in (0.0, 0.0, feet * 0.3048, 0.0, -40.0, 0.0)))
+    found = alert_levels(
+        conf(tmp_path, TCAS), np.zeros(1), np.ones((1, 1), bool), AlertPairs(relative, own)
+    )
+    assert found.level.tolist() == [[level]]
+
+
 OWN = State(*np.array([0.0, 0.0, 1500.0, *velocity(217.0, 60.0), 1.0]))
 CROSSING = State(*np.array([1900.0, -4400.0, 1590.0, *velocity(340.0, 45.0), -1.0]))
 

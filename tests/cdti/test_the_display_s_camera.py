@@ -1,12 +1,16 @@
 """The camera's picture beside the display is of the chosen contact, as it flies now."""
 
 import math
+from types import SimpleNamespace
 
 import crooked
 import numpy as np
 import pytest
 from displayed import displayed
 from wired import SEES_ALL, chain
+
+from components.cdti.camera import CameraSights
+from components.optical.sensors import ElectroOptical
 
 EO = {"front_m2": 6.0, "side_m2": 22.0, "horizontal_m2": 40.0}
 IR = {"front_m2": 2.0, "side_m2": 5.0, "back_m2": 2.0, "horizontal_m2": 12.0}
@@ -77,6 +81,23 @@ def test_the_newest_picture_of_the_chosen_contact_is_shown(seen):
         assert shown["contrast"] == pytest.approx(TARGETS[name][key], abs=6e-4)
 
 
+def test_only_a_camera_s_detections_with_their_pixels_are_pictures():
+    """What another block says is none, though it says pixels; nor what a camera says without."""
+    one = np.ones(1)
+    message = SimpleNamespace(
+        extras={"pixels": one}, roster=["a"], target=np.array([0]), azimuth_rad=one,
+        elevation_rad=one, true_range_m=one, confidence=one, measured_ticks=lambda: one,
+    )  # fmt: skip
+    sights = CameraSights({"eye": object.__new__(ElectroOptical), "other": object()})
+    sights.states = SimpleNamespace(columns=np.array([0]))
+    sights.take("other", message, 10)
+    assert sights.picture(0, None, 1.0, None) is None
+    sights.take("eye", SimpleNamespace(**{**vars(message), "extras": {}}), 10)
+    assert sights.picture(0, None, 1.0, None) is None
+    sights.take("eye", SimpleNamespace(**{**vars(message), "target": np.array([-1])}), 10)
+    assert sights.picture(0, None, 1.0, None) is None
+
+
 @pytest.mark.parametrize(("name", "sensor"), [("turning", "eye"), ("rolling", "again")])
 def test_wings_lie_on_the_picture_as_they_are_seen(seen, name, sensor):
     """Corners of the plate, turned from the target's axes into the camera's, as angles."""
@@ -107,6 +128,10 @@ def test_the_horizon_is_where_it_is_and_stands_askew(seen):
     detected = found["eye", "turning"]
     tilt = math.radians(shown["tilt"])
     assert 1.0 < abs(shown["horizon"]) < 100.0 and abs(shown["tilt"]) > 10.0
+    digits = {"age": 2, "pixels": 1, "contrast": 3, "horizon": 1, "tilt": 2}
+    assert {name: round(shown[name], count) for name, count in digits.items()}.items() <= (
+        shown.items()
+    )
     dip = math.acos(6_371_000.0 / (6_371_000.0 + picture["own"]["alt"]))
     for along in (-80.0, 0.0, 80.0):
         right = shown["horizon"] * math.sin(tilt) + along * math.cos(tilt)

@@ -105,6 +105,27 @@ def test_every_kind_of_run_is_drawn(tmp_path, name):
         assert path.stat().st_size > 8000
 
 
+def test_axes_of_both_figures_stand_where_they_belong(tmp_path, monkeypatch):
+    found = []
+    monkeypatch.setattr(
+        FigureCanvasAgg, "print_png", lambda canvas, *_, **__: found.append(canvas.figure)
+    )
+    draw(*run(tmp_path, a_target("solo"), 2))
+    plan, timeline = found
+    above, heights = plan.axes[:2]
+    places = [axes.get_position() for axes in (above, heights)]
+    assert places[0].x0 == places[1].x0 and places[0].x1 == places[1].x1
+    assert 0.0 < places[0].x0 < places[0].x1 < 1.0
+    assert 0.0 < places[1].y0 < places[1].y1 < places[0].y0 < places[0].y1 < 1.0
+    # A kilometre is as long northwards as eastwards.
+    wide, high = plan.get_size_inches() * [places[0].width, places[0].height]
+    assert wide / np.ptp(above.get_xlim()) == pytest.approx(high / np.ptp(above.get_ylim()))
+    scans, whole = timeline.axes[:2]
+    assert whole.get_title(loc="left") == "Whole run (shaded: the part above)"
+    places = [axes.get_position() for axes in (scans, whole)]
+    assert places[0].x0 == places[1].x0 and 0.0 < places[1].y0 < places[1].y1 < places[0].y0 < 1.0
+
+
 def test_without_sensors_ranges_have_the_figure_for_themselves(tmp_path, monkeypatch):
     """An empty row of scans, and the whole run shaded for it, would say nothing."""
     monkeypatch.setattr("components.display.timeline.read_scans", lambda folder: {})

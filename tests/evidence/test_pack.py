@@ -140,6 +140,9 @@ def test_the_page_holds_what_was_asked_and_loads_nothing(pack):
     body = page.partition("<body>")[2].partition("</body>")[0]
     outside = re.sub(r"<(header|nav|main|style)>.*?</\1>", "", body, flags=re.DOTALL)
     assert re.sub(r"<[^>]*>|\s", "", outside) == "" and page.count("<main>") == 1
+    # No heading stands over nothing: this system has no description.
+    assert not re.search(r"</h[23]>\s*(<p>\s*</p>\s*)*(<h2|</main>)", page)
+    assert not [one for one in re.findall(r"<tr>.*?</tr>", page) if "<th" in one and "<td" in one]
 
 
 def test_a_second_run_and_one_from_the_pack_itself_give_the_same_bytes(case, pack, tmp_path):

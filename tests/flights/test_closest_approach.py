@@ -165,6 +165,41 @@ def test_ties_go_to_the_first_time():
     assert time_s == 3.0
 
 
+def place(east_m, up_m):
+    """States along the equator, so far east and up."""
+    zeros = np.zeros_like(east_m)
+    return SimpleNamespace(
+        lat_deg=zeros, lon_deg=10.0 + east_m * (360.0 / 40_075_016.7), alt_m=zeros + up_m,
+        present=np.ones(len(east_m), dtype=bool),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("at_once", [7, 10_000])
+def test_of_several_approaches_the_nearest_is_found_wherever_it_lies(monkeypatch, at_once):
+    """Targets that come near and go, six times each at other times, no faster than they may."""
+    monkeypatch.setattr(closest_approach, "MOST_AT_ONCE", at_once)
+    draw = np.random.default_rng(9)
+    count, step_s, end_s = 40, 0.5, 150.0
+    speed_mps = draw.uniform(20.0, 200.0, count)
+    when_s = draw.uniform(0.0, end_s, (6, count))
+    nearest_m = draw.uniform(100.0, 2000.0, (6, count))
+
+    def away_m(target, time_s):
+        since_s = np.abs(time_s - when_s[:, target])
+        return (nearest_m[:, target] + speed_mps[target] * since_s).min(axis=0)
+
+    best = closest_approaches(
+        lambda _, time_s: place(np.zeros(len(time_s)), 0.0),
+        lambda target, time_s: place(away_m(target, time_s), 0.0),
+        RegularTimes(step_s, end_s), closing_speed_mps=speed_mps,
+        present_s=(np.full(count, 3.0), np.full(count, 140.0)),
+    )  # fmt: skip
+    times = np.arange(6, 281) * step_s
+    every = np.array([away_m(np.full(len(times), k), times) for k in range(count)])
+    assert best.time_s.tolist() == times[every.argmin(axis=1)].tolist()
+    assert best.range_m == pytest.approx(every.min(axis=1), abs=0.01)
+
+
 @pytest.mark.parametrize("passes_s", [3.3137, 3.999, 4.6, 2.004])
 @pytest.mark.parametrize("step_s", [1.5, 2.0])
 def test_between_two_times_the_closest_approach_is_that_of_straight_flights(passes_s, step_s):
@@ -172,16 +207,8 @@ def test_between_two_times_the_closest_approach_is_that_of_straight_flights(pass
 
     The first stays 200 m above. Three times are known, 1.1 s before it at the most.
     """
-    metre = 360.0 / 40_075_016.7
     known_s = np.array([passes_s - 1.1, passes_s + 0.9, 9.0])
     speed_mps = np.array([90.0, 40.0, 70.0])
-
-    def place(east_m, up_m):
-        zeros = np.zeros_like(east_m)
-        return SimpleNamespace(
-            lat_deg=zeros, lon_deg=10.0 + east_m * metre, alt_m=zeros + up_m,
-            present=np.ones(len(east_m), dtype=bool),
-        )  # fmt: skip
 
     def other_at(target, time_s):
         return place(speed_mps[target] * (time_s - passes_s), 200.0)

@@ -8,6 +8,9 @@ import pytest
 from dsa_des.results import differences, statistics
 from dsa_des.results.labels import AxisName, axis_label, readable, signed, unit_of, value_label
 from dsa_des.results.printing import rounded
+from dsa_des.results.record import NUMBER, Result
+from dsa_des.results.report import _line
+from dsa_des.results.summary import Line
 
 
 @pytest.mark.parametrize(
@@ -111,3 +114,20 @@ def test_axes_of_figures_carry_units() -> None:
     assert value_label("ir.rate_error_ppm", 100) == "IR rate error 100 ppm"
     assert value_label("swap.fusion", "fusion.gated") == "fusion.gated"
     assert unit_of("declaration_time_s.any") == "s" and unit_of("track_breaks") == ""
+
+
+@pytest.mark.parametrize(
+    ("exact", "said"),
+    [
+        (False, ("Declaration range, radar (m)", "1,235", "1,200 to 1,269 *")),
+        (True, ("declaration_range_m.radar", "1234.6", "1200.1 to 1269 *")),
+    ],
+)
+def test_a_line_of_the_report_is_in_words_and_rounded_or_as_its_table_has_it(
+    exact: bool, said: tuple[str, ...]
+) -> None:
+    estimate = statistics.Estimate(1234.567, 1200.1, 1269.03, 12, True)
+    result = Result("declaration_range_m.radar", NUMBER, "true slant range then, m")
+    line = Line((5.0, "x"), result, estimate, 2, 1250.0, runs=14, cut_off=(("never", 2),))
+    cells = _line(line, exact) if exact else _line(line)
+    assert cells == ("5", "x", *said, 12, 2, "few", "2 of 14 never", "1250")

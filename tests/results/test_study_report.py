@@ -81,6 +81,9 @@ def test_a_program_that_reads_it_aloud_finds_its_way(folder: Path) -> None:
     assert [page.count(mark) for mark in ("<main>", "<h1>", "<nav>")] == [1, 1, 1]
     heads = re.findall(r"<th[^>]*>(.*?)</th>", page)
     assert len(heads) > 20 and all(heads)
+    # A row of heads has one over each column, and no heading stands over nothing.
+    assert not [one for one in re.findall(r"<tr>.*?</tr>", page) if "<th" in one and "<td" in one]
+    assert not re.search(r"</h[23]>\s*(<p>\s*</p>\s*)*(<h2|</main>)", page)
     wide = re.findall(r"<div class='wide'[^>]*>", page)
     assert wide and all("tabindex='0'" in one for one in wide)
     assert all('alt="' in one for one in re.findall(r"<img[^>]*>", page))

@@ -1,6 +1,7 @@
 """Every detection carries the variances of its grid, in the ownship's body axes."""
 
 import math
+from types import SimpleNamespace
 
 import crooked
 import numpy as np
@@ -8,6 +9,10 @@ import pytest
 from covering import RANGING, SENSORS
 from scipy.stats import kstest
 from wired import alone, noise_crosses, rows
+
+from components.sensor.grid import VARIANCE_OF
+from components.sensor.measurement_errors import constant_variances, lasting_errors
+from components.sensor.parameters import StatedError
 
 STEPS = {"azimuth_resolution_deg": 3.0, "elevation_resolution_deg": 1.0}
 MOUNT = {"mount_azimuth_deg": -35.0, "mount_elevation_deg": 21.0, "mount_roll_deg": -75.0}
@@ -103,3 +108,39 @@ def test_false_alarms_err_like_what_is_there():
     ground_m_s = value[:, 3] + towards @ own_m_s
     assert np.abs(ground_m_s).max() < 250.0 + 25.0 and np.ptp(ground_m_s) > 480.0
     assert kstest(ground_m_s / 500.0 + 0.5, "uniform").pvalue > 1e-3
+
+
+def stated(*given: float | bool | None) -> SimpleNamespace:
+    """Parameters of a sensor that states one error: step, deviation, bias, time, drawn, share."""
+    return SimpleNamespace(
+        errors="stated", stated_errors=lambda steps: {"range": StatedError(*given)}
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "step", "parts"),
+    [
+        # Biases stay, 4² of a fixed one and a third of it of a drawn one; deviations do not.
+        ((0.0, 3.0, 4.0, 10.0, False, False), 0.0, [(16.0, math.inf, 0.0), (9.0, 10.0, 0.0)]),
+        ((0.0, 3.0, 4.0, None, True, False), 0.0, [(16.0 / 3.0, math.inf, 0.0)]),
+        ((6.0, 3.0, 0.0, None, True, False), 6.0, []),
+        # Shares of a variance that is 0.05² of the value, and 12²/12 m² of rounding that are none.
+        ((12.0, 0.03, 0.04, 5.0, False, True), 12.0,
+         [(-0.64 * 12.0, math.inf, 0.64), (-0.36 * 12.0, 5.0, 0.36)]),
+    ],
+)  # fmt: skip
+def test_what_lasts_of_stated_errors_is_their_bias_and_what_is_correlated(given, step, parts):
+    found = lasting_errors(stated(*given), {})["range"]
+    assert found.step == step
+    assert [(p.variance, p.lasts_s, p.share) for p in found.parts] == [
+        pytest.approx(part) for part in parts
+    ]
+
+
+def test_what_is_new_at_each_look_lasts_not_and_has_one_variance_unless_it_is_a_share():
+    new = stated(0.0, 3.0, 0.0, None, False, False)
+    assert lasting_errors(new, {}) == {}
+    assert constant_variances(new, {}) == {VARIANCE_OF["range"]: 9.0}
+    assert constant_variances(stated(0.0, 0.1, 0.0, None, False, True), {}) == {}
+    new.errors = "signal"
+    assert constant_variances(new, {}) == {}

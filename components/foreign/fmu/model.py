@@ -212,7 +212,8 @@ def _check_library(path: Path, names: list[str], wanted: str, library: str) -> N
         )
     others = sorted({parts[1] for parts in there if parts[1:] != [wanted, ""]} - {"", wanted})
     raise ValueError(
-        f"{path} holds no library for {wanted}, only for {', '.join(others) or 'no platform'}"
+        f"{path} holds no library for {wanted}, "
+        + (f"only for {', '.join(others)}" if others else "nor for anything else")
     )
 
 
