@@ -11,7 +11,7 @@ Between two instants at which something changes lies a stretch. Each is a scene 
 checked as any other; what is the same in it is shared with the one before.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations
@@ -26,6 +26,7 @@ from dsa_des.scene.keys import Key, dotted, flat, key_in, no_item
 from dsa_des.scene.overrides import set_value
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.scene.wiring import MAY_CHANGE as OF_WIRES
+from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK, parse_rational
 
 CHANGES = "changes"
@@ -49,6 +50,9 @@ class TimedChange:
         By dotted key.
     keys : tuple of Key
         Where these are in the scene's tables.
+    resolved : mapping
+        The same values by dotted key of the scene as it is written out (`Scene.resolved`), which
+        has its wires in another order.
     """
 
     number: int
@@ -56,6 +60,7 @@ class TimedChange:
     to_s: Fraction | None
     values: Mapping[str, Any]
     keys: tuple[Key, ...]
+    resolved: Mapping[str, Any]
 
     def sentence(self) -> str:
         """Return, for example, ``from 30 s to 45 s: blocks.radar.enabled = false``."""
@@ -72,7 +77,7 @@ class TimedChange:
         when = {"at_s": from_s} if self.to_s is None else {
             "from_s": from_s, "to_s": as_written(self.to_s)
         }  # fmt: skip
-        return {**when, "set": dict(self.values)}
+        return {**when, "set": dict(self.resolved)}
 
 
 @dataclass(frozen=True)
@@ -84,10 +89,12 @@ class Stretch:
     keys: tuple[str, ...]
 
 
-def read_timed_changes(scene_file: SceneFile, blocks: Mapping[str, Any]) -> list[TimedChange]:
+def read_timed_changes(
+    scene_file: SceneFile, blocks: Mapping[str, Any], wires: Sequence[Wire]
+) -> list[TimedChange]:
     """Return the changes of a scene; what is wrong with them is reported.
 
-    `blocks` are the classes of the scene's blocks, None where one is not known.
+    `blocks` are the classes of the scene's blocks, None where one is not known; `wires` those read.
     """
     entries = scene_file.data.get(CHANGES, [])
     if not isinstance(entries, list):
@@ -96,7 +103,7 @@ def read_timed_changes(scene_file: SceneFile, blocks: Mapping[str, Any]) -> list
     read = [
         change
         for number, entry in enumerate(entries)
-        if (change := _read(scene_file, number, entry, blocks)) is not None
+        if (change := _read(scene_file, number, entry, blocks, wires)) is not None
     ]
     for one, other in combinations(read, 2):
         _refuse_overlap(scene_file, one, other)
@@ -104,7 +111,11 @@ def read_timed_changes(scene_file: SceneFile, blocks: Mapping[str, Any]) -> list
 
 
 def _read(
-    scene_file: SceneFile, number: int, entry: Any, blocks: Mapping[str, Any]
+    scene_file: SceneFile,
+    number: int,
+    entry: Any,
+    blocks: Mapping[str, Any],
+    wires: Sequence[Wire],
 ) -> TimedChange | None:
     at: Key = (CHANGES, number)
     before = len(scene_file.problems)
@@ -137,7 +148,28 @@ def _read(
             scene_file.report((*at, "set", text), reason, value)
     if from_s is None or len(scene_file.problems) > before:
         return None
-    return TimedChange(number, from_s, to_s, values, tuple(keys))
+    resolved = {
+        _written_key(scene_file, text, key, wires): value
+        for (text, value), key in zip(values.items(), keys, strict=True)
+    }
+    return TimedChange(number, from_s, to_s, values, tuple(keys), resolved)
+
+
+def _written_key(scene_file: SceneFile, text: str, key: Key, wires: Sequence[Wire]) -> str:
+    """Return what a dotted key is called where the scene's wires are written out, in order."""
+    if key[0] != "wires":
+        return text
+    entry = scene_file.data["wires"][key[1]]
+    ends = str(entry).split("->")
+    if isinstance(entry, dict):
+        ends = [str(entry.get("from", "")), str(entry.get("to", ""))]
+    first, last = (end.strip() for end in (ends[0], ends[-1]))
+    for place, wire in enumerate(wires):
+        sends = (wire.source, f"{wire.source}.{wire.output}")
+        takes = (wire.target, f"{wire.target}.{wire.input}")
+        if first in sends and last in takes:
+            return dotted(("wires", place, *key[2:]))
+    return text
 
 
 def _seconds(scene_file: SceneFile, key: Key, value: Any) -> Fraction | None:

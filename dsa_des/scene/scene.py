@@ -385,7 +385,7 @@ def check_scene(scene_file: SceneFile) -> Scene:
     scene._tables = scene_file
     scene.outages = read_outages(scene_file, classes, duration)
     if CHANGES in data:
-        scene.changes = read_timed_changes(scene_file, classes)
+        scene.changes = read_timed_changes(scene_file, classes, wires)
         scene.stretches = stretches_of(scene_file, scene, scene.changes, check_scene)
         scene.ticks_per_s = ticks_of_all(scene_file, scene)
     if scene_file.problems and len(sections) == len(section_models()):

@@ -9,7 +9,9 @@ from covering import covers
 from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 
 import dsa_des
+from dsa_des.costs.variants import Variants
 from dsa_des.errors import SceneError
+from dsa_des.files.toml_files import to_toml
 from dsa_des.running.simulation import Simulation
 
 
@@ -243,6 +245,16 @@ def test_changes_of_one_key_must_not_overlap():
 
 def test_a_run_folder_says_what_changed():
     changed = scene(change("blocks.radar.enabled", False, from_s="1/3", to_s=4))
+    late = scene(change("wires[2].delay_s", 1, at_s=3), tracks=True)
+    there = dsa_des.load_scene(late.resolved())
+    assert there.stretches[0].scene.wires == late.stretches[0].scene.wires != late.wires
     again = dsa_des.load_scene(changed.resolved())
     assert again.stretches[0].from_s == Fraction(1, 3)
     assert [one.written() for one in again.changes] == [one.written() for one in changed.changes]
+
+
+def test_costs_are_of_scenes_that_stay_as_they_are(tmp_path):
+    path = tmp_path / "changes.toml"
+    path.write_text(to_toml(scene(change("blocks.radar.enabled", False)).resolved()))
+    with pytest.raises(SceneError, match="costs are of a scene that stays as it is"):
+        Variants(path)
