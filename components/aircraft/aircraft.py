@@ -185,6 +185,9 @@ class Aircraft(Parameters):
     )
 
 
+#: The name of whose place a scene is seen from where nothing else is said.
+OWNSHIP = "ownship"
+
 # A target without areas is a point, of a centimetre.
 _LEAST_EXTENT_M = 0.01
 
@@ -201,17 +204,24 @@ class Roster:
     """The targets of a run: their names, their draw keys and what sensors need of them.
 
     Replicas in lock step may have other aircraft of the same names: columns, and indices of tables,
-    are then over the aircraft of the first replica, those of the second, and so on.
+    are then over the aircraft of the first replica, those of the second, and so on. Of whoever
+    looks there is one, or one for each replica.
     """
 
     names: tuple[str, ...]
     aircraft: tuple[Aircraft, ...]
+    own_name: str = OWNSHIP
+    own_aircraft: tuple[Aircraft, ...] = (Aircraft(),)
 
     @classmethod
-    def of(cls, targets: Sequence[tuple[str, Aircraft]]) -> "Roster":
+    def of(
+        cls,
+        targets: Sequence[tuple[str, Aircraft]],
+        own: tuple[str, Aircraft] = (OWNSHIP, Aircraft()),
+    ) -> "Roster":
         """Return the roster of (name, aircraft) pairs; two with one address are refused."""
         bearers: dict[str, str] = {}
-        for name, craft in targets:
+        for name, craft in (own, *targets):
             if craft.icao_address and (craft.mode_s or craft.ads_b):
                 other = bearers.setdefault(craft.icao_address.upper(), name)
                 if other != name:
@@ -220,7 +230,22 @@ class Roster:
                         f"{name!r}: each aircraft has one of its own; give another, or leave it "
                         "out"
                     )
-        return cls(tuple(name for name, _ in targets), tuple(craft for _, craft in targets))
+        names, aircraft = zip(*targets, strict=True) if targets else ((), ())
+        return cls(names, aircraft, own[0], (own[1],))
+
+    def seen_from(self, target: int) -> "Roster":
+        """Return the roster of who looks from a target: it and whose roster it is change places."""
+        known: dict[int, Roster] = self.__dict__.setdefault("_seen_from", {})
+        if target not in known:
+            width, own = len(self.names), self.own_aircraft
+            names, aircraft = list(self.names), list(self.aircraft)
+            looking = aircraft[target::width]
+            aircraft[target::width] = own if len(own) > 1 else own * len(looking)
+            names[target] = self.own_name
+            known[target] = Roster(
+                tuple(names), tuple(aircraft), self.names[target], tuple(looking)
+            )
+        return known[target]
 
     def __len__(self) -> int:
         return len(self.names)
@@ -229,7 +254,9 @@ class Roster:
         return self is other or (
             isinstance(other, Roster)
             and self.names == other.names
+            and self.own_name == other.own_name
             and all(map(_alike, self.aircraft, other.aircraft))
+            and all(map(_alike, self.own_aircraft, other.own_aircraft))
         )
 
     def __hash__(self) -> int:
@@ -339,32 +366,44 @@ class Roster:
 _MAY_DIFFER = ("rcs_dbsm", "mode_s", "mode_c", "ads_b", "icao_address")
 
 
-def joint_roster(first: Roster, aircraft: Sequence[tuple[str, Aircraft]]) -> Roster | None:
+def joint_roster(
+    first: Roster,
+    aircraft: Sequence[tuple[str, Aircraft]],
+    own: Sequence[tuple[str, Aircraft]] = (),
+) -> Roster | None:
     """Return the roster of all replicas, or None where they cannot have one.
 
     Radar cross-sections and equipage may differ: how far a sensor looks, and which physics it has,
-    does not rest on them. Whatever else differs may decide how far a sensor looks.
+    does not rest on them. Whatever else differs may decide how far a sensor looks. The `own` ones
+    are those of the replicas that look; left out, they are all alike.
     """
     width = len(first)
     if width == 0:
         return None if aircraft else first
     if len(aircraft) % width:
         return None
-    same = True
-    for number, (name, craft) in enumerate(aircraft):
-        index = number % width
-        if name != first.names[index]:
-            return None
-        other = first.aircraft[index]
-        if _alike(craft, other):
-            continue
-        same = False
-        if any(
-            getattr(craft, field) != getattr(other, field)
-            for field in Aircraft.model_fields
-            if field not in _MAY_DIFFER
-        ):
-            return None
-    if same:
+    alike = [
+        _fit(one, (first.names[number % width], first.aircraft[number % width]))
+        for number, one in enumerate(aircraft)
+    ]
+    alike += [_fit(one, (first.own_name, first.own_aircraft[0])) for one in own]
+    if None in alike:
+        return None
+    if all(alike):
         return first
-    return Roster(first.names, tuple(craft for _, craft in aircraft))
+    mine = tuple(craft for _, craft in own) or first.own_aircraft
+    return Roster(first.names, tuple(craft for _, craft in aircraft), first.own_name, mine)
+
+
+def _fit(one: tuple[str, Aircraft], other: tuple[str, Aircraft]) -> bool | None:
+    """Return whether an aircraft is the same as another's, None where no roster holds both."""
+    if one[0] != other[0]:
+        return None
+    if _alike(one[1], other[1]):
+        return True
+    differing = (
+        field
+        for field in Aircraft.model_fields
+        if getattr(one[1], field) != getattr(other[1], field)
+    )
+    return False if all(field in _MAY_DIFFER for field in differing) else None

@@ -8,35 +8,52 @@ from dsa_des.block.component import Context
 
 
 class KnownTraffic:
-    """What a traffic block offers: what its targets are, and where they can be.
+    """What a traffic block offers: what the targets are of who looks, and where they can be.
 
     Two offers are equal when their targets are and it was not asked where these can be. `envelope`
-    gives, for a reach in m and the time in s that a look lasts, the run's
-    `components.flights.bounds.TrafficEnvelope`; None where it depends on what will be sensed.
+    gives, for a reach in m, the time in s that a look lasts and who looks (a target, or -1), the
+    run's `components.flights.bounds.TrafficEnvelope`; None where it depends on what will be sensed.
     """
 
-    def __init__(self, roster: Roster, envelope: Callable[[float, float], Any] | None) -> None:
+    def __init__(
+        self,
+        roster: Roster,
+        envelope: Callable[[float, float, int], Any] | None,
+        viewer: int = -1,
+    ) -> None:
         self.roster = roster
         self._envelope = envelope
+        self._viewer = viewer
         self._asked = False
+        self._views: dict[int, KnownTraffic] = {}
+
+    def seen_from(self, platform: str) -> "KnownTraffic":
+        """Return what is offered to who looks from a platform."""
+        if platform == self.roster.own_name:
+            return self
+        target = self.roster.names.index(platform)
+        if target not in self._views:
+            roster = self.roster.seen_from(target)
+            self._views[target] = KnownTraffic(roster, self._envelope, target)
+        return self._views[target]
 
     @property
     def asked(self) -> bool:
         """Whether a block went by where the targets can be."""
-        return self._asked
+        return self._asked or any(view.asked for view in self._views.values())
 
     def envelope(self, reach_m: float, lasts_s: float) -> Any:
         """Return the run's envelope for a reach, or None."""
         if self._envelope is None:  # of no replica
             return None
         self._asked = True
-        return self._envelope(reach_m, lasts_s)
+        return self._envelope(reach_m, lasts_s, self._viewer)
 
     def __eq__(self, other: object) -> bool:
         return self is other or (
             isinstance(other, KnownTraffic)
             and self.roster == other.roster
-            and not (self._asked or other._asked)
+            and not (self.asked or other.asked)
         )
 
     def __hash__(self) -> int:

@@ -207,6 +207,7 @@ class _EncounterTraffic(RecordedTraffic):
         if (own := self.p.scripted_ownship) is not None:
             self._refuse_another_place(own.lat_deg, own.lon_deg)
             self.own = flight_of(own, own.start, self.wind)
+            self._let_ownship_be(own)
 
     def read(self) -> TrafficFile:
         """Return the flights of the encounter."""

@@ -310,6 +310,7 @@ def met_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
         or one.scripted_ownship is not None
         or p.step_s is not None
         or p.tau_s > 0.0
+        or p.platform is not None
         or any(r.changes.keys() - {f"blocks.{block.name}.encounter"} for r in group.replicas)
     ):
         return None

@@ -1,7 +1,7 @@
 """The flights that the traffic passes on with its rows, for who must know other instants.
 
-What is known of a flight depends on when it is asked: an ownship that is steered will turn where
-it is not expected yet. So every row says how many of its ownship's manoeuvres it knows, and goes by
+What is known of a flight depends on when it is asked: an aircraft that is steered will turn where
+it is not expected yet. So every row says how many manoeuvres of each platform it knows, and goes by
 these whatever the other rows of its message know.
 """
 
@@ -35,23 +35,28 @@ class AllFlights(Protocol):
         columns: IntArray,
         time_s: FloatArray,
         ahead_s: FloatArray | float,
+        viewer: int,
     ) -> tuple[TrajectoryState, TrajectoryState]:
-        """Return states of the ownships of some runs and of targets (`columns` of the roster).
+        """Return states of who looks, in some runs, and of the targets (`columns` of its roster).
 
-        Times are (rows, 1) or (rows, columns), and so are the ownships' states; `known` is how many
-        manoeuvres of the ownship count. `ahead_s` is how long after what is known at a time it is
-        asked: where positions are published at a rate of their own, after the last publication.
+        Times are (rows, 1) or (rows, columns), and so are the states of who looks; `known` (...,
+        platforms) is how many manoeuvres of each count. `ahead_s` is how long after what is known
+        at a time it is asked: where positions are published at a rate of their own, after the last
+        publication. `viewer` is the target from which the others are seen, -1 for the ownship.
         """
 
-    def own_states(self, run: IntArray, known: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of the ownships of runs (n,), likewise, each at a time (n,) of its own."""
+    def own_states(
+        self, run: IntArray, known: IntArray, time_s: FloatArray, viewer: int
+    ) -> TrajectoryState:
+        """Return states of who looks in runs (n,), likewise, each at a time (n,) of its own."""
 
 
 class KnownFlights:
     """The flights known at each row of a message, all of one traffic.
 
-    Of each row its run, and how many manoeuvres of the ownship it knows, (rows,); `seen` are the
-    functions that are applied to the states in turn.
+    Of each row its run (rows,), and how many manoeuvres of each platform it knows, (rows,
+    platforms); they are seen from `viewer` (-1 for the ownship). `seen` are the functions that are
+    applied to the states in turn.
     """
 
     def __init__(
@@ -60,8 +65,10 @@ class KnownFlights:
         run: IntArray,
         known: IntArray,
         seen: tuple[Callable[..., Any], ...] = (),
+        viewer: int = -1,
     ) -> None:
-        self.flights, self.run, self.known, self._seen = flights, run, known, seen
+        self.flights, self.run, self.known = flights, run, known
+        self._seen, self._viewer = seen, viewer
 
     def __len__(self) -> int:
         return len(self.run)
@@ -69,7 +76,7 @@ class KnownFlights:
     def __call__(self, columns: IntArray, time_s: FloatArray) -> Any:
         """Return what is seen of targets at times (rows, 1) or (rows, columns).
 
-        The states of the ownship, of the times' shape, and of the targets (rows, columns); or what
+        The states of who looks, of the times' shape, and of the targets (rows, columns); or what
         `seen_by` makes of them, arrays by name.
         """
         run, known = self.run[:, np.newaxis], self.known[:, np.newaxis]
@@ -87,35 +94,46 @@ class KnownFlights:
         return _flat(self._states(run, known, column, time_s[np.newaxis], ahead_s[np.newaxis]))
 
     def own_at(self, row: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return the states of the ownship as some rows (n,) know it, at a time (n,) of each."""
-        return self.flights.own_states(self.run[row], self.known[row], time_s)
+        """Return the states of who looks as some rows (n,) know it, at a time (n,) of each."""
+        return self.flights.own_states(self.run[row], self.known[row], time_s, self._viewer)
 
-    def _states(self, *asked: Any) -> Any:
-        states: Any = self.flights.states(*asked)
+    def _states(
+        self, run: IntArray, known: IntArray, columns: IntArray, time_s: FloatArray, ahead_s: Any
+    ) -> Any:
+        flights, viewer = self.flights, self._viewer
+        states: Any = flights.states(run, known, columns, time_s, ahead_s, viewer)
         for seen in self._seen:
             states = seen(*states)
         return states
 
+    def seen_from(self, viewer: int) -> KnownFlights:
+        """Return the same for who looks from a target."""
+        return self._with(self.run, self.known, viewer=viewer)
+
     def seen_by(self, seen: Callable[..., Mapping[str, AnyArray]]) -> KnownFlights:
         """Return the same for who looks at the states through `seen`, which takes both."""
-        return KnownFlights(self.flights, self.run, self.known, (*self._seen, seen))
+        return self._with(self.run, self.known, seen=(*self._seen, seen))
 
     def take_rows(self, rows: slice | IntArray) -> KnownFlights:
         """Return the flights of some rows."""
-        return KnownFlights(self.flights, self.run[rows], self.known[rows], self._seen)
+        return self._with(self.run[rows], self.known[rows])
+
+    def _with(self, run: IntArray, known: IntArray, **changed: Any) -> KnownFlights:
+        how = {"seen": self._seen, "viewer": self._viewer, **changed}
+        return KnownFlights(self.flights, run, known, **how)
 
     @classmethod
     def join_rows(cls, parts: Sequence[KnownFlights]) -> KnownFlights:
         """Return the flights of the rows of all parts, in the order given."""
         newest = max(parts, key=lambda part: part.flights.manoeuvre_count)
         for part in parts:
-            one = part.flights.traffic is newest.flights.traffic and part._seen == newest._seen
-            if not one:
+            how = part.flights.traffic is newest.flights.traffic, part._seen, part._viewer
+            if how != (True, newest._seen, newest._viewer):
                 raise NotInLockStep("rows know flights of one traffic, seen by one line of sight")
         run, known = (
             np.concatenate([getattr(part, name) for part in parts]) for name in ("run", "known")
         )
-        return KnownFlights(newest.flights, run, known, newest._seen)
+        return newest._with(run, known)
 
 
 def _flat(seen: Mapping[str, Any]) -> Mapping[str, AnyArray]:

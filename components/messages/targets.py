@@ -22,7 +22,7 @@ from components.messages.columns import OWN_NED, TURNED, WGS84
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import Decision
 from dsa_des.arrays.run_ticks import says_no_runs
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Column, Columns, Message, Text, per_row, static
 
 #: Half of the time over which positions are compared for a velocity; a power of two, so that
@@ -169,6 +169,10 @@ class TrafficStates(Message):
     culled : (rows,) of int, or None
         How many of the roster are out of all sensors' reach at each instant; those among the
         columns are not `present`. None where all are moved.
+    present_to : dict of (rows, targets) of bool, or None
+        The same of other platforms by their names, where the ownship is in the place of that one.
+    culled_to : dict of (rows,) of int, or None
+        And how many are out of reach of what these carry.
     flights : KnownFlights or None
         The flights as each row knows them, for a beam that sweeps: it must know them at other
         instants. None where no block does.
@@ -194,6 +198,8 @@ class TrafficStates(Message):
     roster: Roster = static()
     columns: IntArray = static()
     culled: IntArray | None = per_row(default=None, kw_only=True)
+    present_to: dict[str, BoolArray] | None = per_row(default=None, kw_only=True)
+    culled_to: dict[str, IntArray | None] | None = per_row(default=None, kw_only=True)
     flights: KnownFlights | None = per_row(default=None, kw_only=True)
     true_flights: KnownFlights | None = per_row(default=None, kw_only=True)
     run_time_s: FloatArray | None = per_row(default=None, kw_only=True)
@@ -210,6 +216,28 @@ class TrafficStates(Message):
             **{name: getattr(others, name) for name in POSE_FIELDS},
             **more,
         )
+
+    def seen_from(self, platform: str) -> Self:
+        """Return the states as who looks from a platform has them: it is the one whose own they are
+        and the ownship is in its place.
+        """
+        if platform == self.roster.own_name:
+            return self
+        target = self.roster.names.index(platform)
+        place = int(np.searchsorted(self.columns, target))
+        seen = self._copy()
+        for name in POSE_FIELDS:
+            values = getattr(self, name).copy()
+            setattr(seen, f"own_{name}", values[:, place].copy())
+            values[:, place] = getattr(self, f"own_{name}")
+            setattr(seen, name, values)
+        assert self.present_to is not None and self.culled_to is not None
+        seen.present, seen.culled = self.present_to[platform], self.culled_to[platform]
+        seen.roster = self.roster.seen_from(target)
+        seen.present_to = seen.culled_to = seen.true_flights = None
+        if self.flights is not None:
+            seen.flights = self.flights.seen_from(target)
+        return seen
 
     def check(self) -> None:
         """Refuse arrays without a column for each of the targets, too."""
@@ -326,11 +354,17 @@ def over_same_targets(parts: Sequence[Any]) -> list[Any]:
 def _widened(part: Any, columns: IntArray) -> Any:
     index = np.searchsorted(columns, part.columns)
     result = copy(part)
+
+    def widened(values: AnyArray) -> AnyArray:
+        wide = np.zeros((len(values), len(columns)), dtype=values.dtype)
+        wide[:, index] = values
+        return wide
+
     for name, values in vars(part).items():
         if isinstance(values, np.ndarray) and values.ndim == 2:
-            wide = np.zeros((len(values), len(columns)), dtype=values.dtype)
-            wide[:, index] = values
-            setattr(result, name, wide)
+            setattr(result, name, widened(values))
+    if getattr(part, "present_to", None):
+        result.present_to = {name: widened(there) for name, there in part.present_to.items()}
     if isinstance(part, GatedTargets):
         result.decisions = {
             sensor: decision.widened(index, len(columns))

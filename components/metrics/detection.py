@@ -318,7 +318,8 @@ def _declarations(
             seen_s,
             at_start(group, name, seen_s),
         )
-    result[ANY] = _earliest(list(result.values()))
+    if result:
+        result[ANY] = _earliest(list(result.values()))
     return result
 
 

@@ -18,6 +18,7 @@ from components.metrics.flown_flights import FlownMetric, each_alone
 from components.metrics.losses import closest, losses_s
 from components.metrics.rows import (
     SCANS,
+    PlatformParameters,
     TargetParameters,
     earliest,
     is_named,
@@ -27,7 +28,6 @@ from components.metrics.rows import (
 from components.metrics.separation import RelativeFlight, traffic_block
 from components.well_clear.volume import PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
-from dsa_des.block.component import Parameters
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result, recorded_by
 
@@ -53,7 +53,7 @@ def size(default_m: float, description: str) -> Any:
     return Field(default=default_m, gt=0, le=1e6, description=description)
 
 
-class EncounterParameters(DeclarationParameters):
+class EncounterParameters(DeclarationParameters, PlatformParameters):
     """Parameters of encounter metrics."""
 
     step_s: float = Field(
@@ -61,7 +61,7 @@ class EncounterParameters(DeclarationParameters):
     )
 
 
-class SizeParameters(Parameters):
+class SizeParameters(PlatformParameters):
     """What counts as a loss of well clear, and as a near mid-air collision."""
 
     horizontal_m: float = size(
@@ -113,7 +113,9 @@ class _Encounter(FlownMetric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        self.sensors = sensors_of(scene, parameters.sensors)
+        self.sensors = self.on_platform(sensors_of(scene, parameters.sensors))
+        #: Sensors, and any of them, where there is one.
+        self.reports = [*self.sensors, ANY] if self.sensors else []
 
 
 class ClosestApproach(_Encounter):
@@ -129,7 +131,7 @@ class ClosestApproach(_Encounter):
             Result("closest_approach_m", NUMBER, "smallest slant range, m", _CUT_OFF, least=0.0),
             Result("closest_approach_time_s", NUMBER, "when that is, s", _CUT_OFF, least=0.0),
         ]
-        for name in [*self.sensors, ANY]:
+        for name in self.reports:
             seen, declared = (f"{what}_to_closest_cut_off.{name}" for what in _BEFORE)
             results += [
                 Result(
@@ -198,7 +200,7 @@ class WellClear(_Encounter):
                 f"warning_time_s.{name}", NUMBER, "from declaration to the loss, s",
                 f"warning_cut_off.{name}",
             )
-            for name in [*self.sensors, ANY]
+            for name in self.reports
         ]  # fmt: skip
         return results
 
@@ -289,7 +291,7 @@ class AlertTimes(FlownMetric):
         traffic = traffic_block(scene).name
         #: Whether losses are of what was flown, so that a run that ended early has no later ones.
         self._as_flown = parameters.steered or all(w.target != traffic for w in scene.wires)
-        self._blocks = recorded_by(scene, "alerts")
+        self._blocks = self.on_platform(recorded_by(scene, "alerts"))
 
     def results(self) -> list[Result]:
         """Return times and events of each alerting block."""

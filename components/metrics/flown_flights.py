@@ -1,9 +1,9 @@
-"""True flights of a group of replicas, as planned and as the ownship was steered."""
+"""True flights of a group of replicas, as planned and as platforms were steered."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,11 @@ from components.metrics.separation import (
     RelativeFlight,
     separations,
     traffic_block,
+    traffic_of,
 )
 from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.errors import did_you_mean
+from dsa_des.scene.platforms import platforms_of
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import Group
 
@@ -30,10 +33,21 @@ _SCORES: dict[str, FloatArray] = {
 
 #: Manoeuvres and when they came, s, in order.
 Steering = Sequence[tuple[float, Manoeuvre]]
+#: Those of a run, by the index of the target that is steered; -1 for the ownship.
+SteeringOfRun = Mapping[int, Steering]
+
+
+class _Told(NamedTuple):
+    """A manoeuvre: when it was told and came, s, and who is steered (-1 for the ownship)."""
+
+    told_s: float
+    came_s: float
+    steered: int
+    manoeuvre: Manoeuvre
 
 
 def flown_as_steered(own: Sequence[Any], steering: Sequence[Steering]) -> list[SteeredFlight]:
-    """Return what ownships fly, each steered by at least one manoeuvre."""
+    """Return what aircraft fly, each steered by at least one manoeuvre."""
     flights = SteeredFleet(fleet_of(own))
     for turn in range(max(map(len, steering), default=0)):
         now = [number for number, one in enumerate(steering) if len(one) > turn]
@@ -45,9 +59,10 @@ def flown_as_steered(own: Sequence[Any], steering: Sequence[Steering]) -> list[S
 
 
 class FlownMetric(TargetMetric):
-    """A metric of true flights: as planned, or as recorded manoeuvres steered the ownship.
+    """A metric of true flights: as planned, or as recorded manoeuvres steered the aircraft.
 
-    Refused where manoeuvres reach the traffic block by wires of any but a fixed delay.
+    Distances are those from the ownship, or from the platform that the parameters name. Refused
+    where manoeuvres reach the traffic block by wires of any but a fixed delay.
     """
 
     scores = _SCORES
@@ -55,6 +70,17 @@ class FlownMetric(TargetMetric):
     def __init__(self, parameters: Any, scene: Scene, *, steered: bool = True) -> None:
         super().__init__(parameters, scene)
         traffic = traffic_block(scene).name
+        #: Who looks: a target by its index, -1 for the ownship.
+        self.viewer = -1
+        self._on: dict[str, int] = {}
+        named = getattr(parameters, "platform", None)
+        if named or any(block.options.platform for block in scene.blocks.values()):
+            names = traffic_of(scene)[0].platforms()
+            if named is not None and named not in names:
+                raise ValueError(f"platform: there is no {named!r}{did_you_mean(named, names)}")
+            carrying = platforms_of(scene, {traffic: names})
+            self._on = {block: names.index(on) - 1 for block, on in carrying.items()}
+            self.viewer = -1 if named is None else names.index(named) - 1
         #: Block that steers → delay of its manoeuvres; of none where flights are those planned.
         self.delays_s: dict[str, float] = {}
         for wire in scene.wires if steered else ():
@@ -69,16 +95,25 @@ class FlownMetric(TargetMetric):
         if self.delays_s:
             self.tables = {**self.tables, "manoeuvres": ("block", "time_s", *_COLUMNS)}
 
-    def manoeuvres(self, group: Group) -> Mapping[int, Steering]:
-        """Return the manoeuvres of every replica of a group that has any."""
-        return {k: [one[1:] for one in mine] for k, mine in self._told(group).items()}
+    def on_platform(self, blocks: Sequence[str]) -> list[str]:
+        """Return those of some blocks that are on the platform that looks."""
+        return [block for block in blocks if self._on.get(block, -1) == self.viewer]
 
-    def _told(self, group: Group) -> Mapping[int, list[tuple[float, float, Manoeuvre]]]:
+    def manoeuvres(self, group: Group) -> Mapping[int, Steering]:
+        """Return the manoeuvres of who looks, of every replica of a group that has any."""
+        own = {k: _by_platform(told).get(self.viewer, ()) for k, told in self._told(group).items()}
+        return {k: steering for k, steering in own.items() if steering}
+
+    def steered_runs(self, group: Group) -> IntArray:
+        """Return the replicas in which any aircraft is steered."""
+        return np.array(sorted(self._told(group)), dtype=np.int64)
+
+    def _told(self, group: Group) -> Mapping[int, list[_Told]]:
         """Return when each manoeuvre of every replica that has any was told, came, and what it was.
 
         In order of coming; what is told is known when all before it is.
         """
-        result: dict[int, list[tuple[float, float, Manoeuvre]]] = {}
+        result: dict[int, list[_Told]] = {}
         if not self.delays_s:
             return result
         table: Any = group.tables["manoeuvres"]
@@ -92,11 +127,13 @@ class FlownMetric(TargetMetric):
                 continue
             came_s = time_s + self.delays_s[names[block]]
             if came_s < group.duration_s[replica]:
-                result.setdefault(replica, []).append((time_s, came_s, Manoeuvre(*values)))
+                steered = self._on.get(names[block], -1)
+                told = _Told(time_s, came_s, steered, Manoeuvre(*values))
+                result.setdefault(replica, []).append(told)
         for replica, mine in result.items():
-            mine.sort(key=lambda one: one[1])
-            told_s = np.maximum.accumulate([one[0] for one in mine]).tolist()
-            result[replica] = [(t, *one[1:]) for t, one in zip(told_s, mine, strict=True)]
+            mine.sort(key=lambda one: one.came_s)
+            told_s = np.maximum.accumulate([one.told_s for one in mine]).tolist()
+            result[replica] = [one._replace(told_s=t) for t, one in zip(told_s, mine, strict=True)]
         return result
 
     def of_flights(
@@ -139,11 +176,13 @@ class FlownMetric(TargetMetric):
         for count in range(1 + max(map(len, told.values()), default=0)):
             # As if no more than so many manoeuvres were told: known from when the last of them is.
             some = np.array([k for k in range(len(group)) if len(told.get(k, ())) >= count])
-            steering = {k: [one[1:] for one in mine[:count]] for k, mine in told.items()}
-            runs, run_of = flights_of(group, self.p.step_s, None, steering)
+            steering = {k: _by_platform(mine[:count]) for k, mine in told.items()}
+            runs, run_of = flights_of(group, self.p.step_s, None, steering, viewer=self.viewer)
             used, mine = np.unique(run_of[some], return_inverse=True)
             event_s = first_within_s([(radius_m, half_m)], [runs[k] for k in used])[0, mine]
-            known = [(0.0, *(one[0] for one in told.get(k, ())), math.inf) for k in some.tolist()]
+            known = [
+                (0.0, *(one.told_s for one in told.get(k, ())), math.inf) for k in some.tolist()
+            ]
             from_s, until_s = np.array([times[count : count + 2] for times in known]).T
             for number, level in enumerate(levels):
                 at_s = np.fmax(from_s, event_s - level)
@@ -172,9 +211,12 @@ class FlownMetric(TargetMetric):
     def _flights(
         self, group: Group, steered: bool, to_the_end: bool, some: IntArray | None = None
     ) -> tuple[list[list[RelativeFlight]], IntArray]:
-        steering = self.manoeuvres(group) if steered else None
-        target = getattr(self.p, "target", None)
-        return flights_of(group, self.p.step_s, target, steering, to_the_end=to_the_end, some=some)
+        told = self._told(group) if steered else {}
+        steering = {k: _by_platform(mine) for k, mine in told.items()}
+        target, step_s = getattr(self.p, "target", None), self.p.step_s
+        return flights_of(
+            group, step_s, target, steering, to_the_end=to_the_end, some=some, viewer=self.viewer
+        )
 
 
 #: What is read of runs, each a list of its flights: (values, runs).
@@ -190,16 +232,17 @@ def flights_of(
     group: Group,
     step_s: float | None,
     target: str | None,
-    steering: Mapping[int, Steering] | None = None,
+    steering: Mapping[int, SteeringOfRun] | None = None,
     *,
     to_the_end: bool = False,
     some: IntArray | None = None,
+    viewer: int = -1,
 ) -> tuple[list[list[RelativeFlight]], IntArray]:
     """Return the flights of runs that differ, and which of these each of `some` replicas is.
 
     All are by default. Flights are computed once for all replicas that share them. Distances are
     taken every `step_s`; None looks between them for losses. A target of None is all of them. The
-    ownship of a replica flies as `steering` says, if anything. A run that ended early is looked at
+    aircraft of a replica fly as `steering` says, if anything. A run that ended early is looked at
     `to_the_end` of it, or as long as it was meant to last.
     """
     steering = steering or {}
@@ -224,15 +267,46 @@ def flights_of(
         if run_of[number] < len(runs):
             continue
         scene = group.scenes[number] if mine else group.scene
-        make = partial(separations, scene, step_s, until_s)
-        flights = group.once(("separations", step_s, key), make)
+        make = partial(separations, scene, step_s, until_s, viewer)
+        flights = group.once(("separations", step_s, viewer, key), make)
         runs.append([flight for flight in flights if target in (None, flight.name)])
         if alone and runs[-1]:
             steered.append(number)
-    flown = flown_as_steered(
-        [runs[run_of[number]][0].own for number in steered],
-        [steering[number] for number in steered],
-    )
-    for number, own in zip(steered, flown, strict=True):
-        runs[run_of[number]] = [flight.flown_by(own) for flight in runs[run_of[number]]]
+    told = [
+        (number, place, flight, there)
+        for number in steered
+        for place, flight in _aircraft_of(runs[run_of[number]]).items()
+        if (there := _while_there(place, flight, steering[number].get(place, ())))
+    ]
+    flown = flown_as_steered([one[2] for one in told], [one[3] for one in told])
+    by_run: dict[int, dict[int, SteeredFlight]] = {}
+    for (number, place, *_), new in zip(told, flown, strict=True):
+        by_run.setdefault(number, {})[place] = new
+    for number, new_flights in by_run.items():
+        runs[run_of[number]] = [flight.flown(new_flights) for flight in runs[run_of[number]]]
     return runs, run_of if some is None else run_of[some]
+
+
+def _by_platform(told: Sequence[_Told]) -> dict[int, list[tuple[float, Manoeuvre]]]:
+    """Return what each aircraft is told, by its index."""
+    result: dict[int, list[tuple[float, Manoeuvre]]] = {}
+    for one in told:
+        result.setdefault(one.steered, []).append((one.came_s, one.manoeuvre))
+    return result
+
+
+def _aircraft_of(run: Sequence[RelativeFlight]) -> dict[int, Any]:
+    """Return the flights of a run's aircraft, by their index."""
+    return {
+        place: flight
+        for one in run
+        for place, flight in zip(one.places, (one.own, one.target), strict=True)
+    }
+
+
+def _while_there(place: int, flight: Any, steering: Steering) -> Steering:
+    """Return what an aircraft is told while it is there; the ownship always is."""
+    if place < 0:
+        return steering
+    first_s, last_s = flight.interval_present()
+    return [one for one in steering if first_s <= one[0] <= last_s]

@@ -6,13 +6,16 @@ from typing import Any
 import numpy as np
 
 from components.metrics.flown_flights import FlownMetric
+from components.metrics.rows import PlatformParameters
 from dsa_des.arrays.types import FloatArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import NUMBER, Group, Result
 
 
 class ManoeuvreTimes(FlownMetric):
-    """When the first manoeuvre reaches the ownship, and how many do."""
+    """When the first manoeuvre reaches the ownship, or a platform, and how many do."""
+
+    Parameters = PlatformParameters
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)

@@ -67,7 +67,7 @@ class Mitigated(FlownMetric):
         """Return all of it for every replica: whoever is told nothing flies as without."""
         nominal = self.nominal(group)
         mitigated = {name: nominal[f"{name}_nominal"].copy() for name in _EVENTS}
-        told = np.array(sorted(self.manoeuvres(group)), dtype=np.int64)
+        told = self.steered_runs(group)
         if len(told):
             for name, flags in self.losses(group, steered=True, some=told).items():
                 mitigated[name][told] = flags

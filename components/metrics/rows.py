@@ -20,6 +20,15 @@ FUSED = "fused"
 SCANS = {"scans": ("block", "time_s")}
 
 
+class PlatformParameters(Parameters):
+    """Parameters of metrics of flights."""
+
+    platform: str | None = Field(
+        default=None,
+        description="Name of the aircraft from which the others are seen; by default the ownship.",
+    )
+
+
 class TargetParameters(Parameters):
     """Parameters of most metrics."""
 
@@ -43,6 +52,8 @@ class TargetMetric(Metric):
         """Refuse a target that the traffic does not have."""
         sources = [block for block in blocks.values() if isinstance(block, TrafficSource)]
         names = [target.name for source in sources for target in source.targets]
+        if getattr(self.p, "platform", None):
+            names += [source.roster.own_name for source in sources]
         target = getattr(self.p, "target", None)
         if sources and target is not None and target not in names:
             raise ValueError(f"target: there is no {target!r}{did_you_mean(target, names)}")

@@ -4,7 +4,7 @@ Nothing here depends on what sensors see; it is read off the traffic block of a 
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass
 from fractions import Fraction
@@ -73,9 +73,11 @@ def traffic_of(scene: Scene) -> tuple[Any, float]:
 
 
 def separations(
-    scene: Scene, step_s: float | None, until_s: float = math.inf
+    scene: Scene, step_s: float | None, until_s: float = math.inf, viewer: int = -1
 ) -> "list[RelativeFlight]":
     """Return the distances of every target of a scene, up to an early end of the run at `until_s`.
+
+    Seen from a target, by its index, it and the ownship (-1) change places.
 
     They are taken on a grid of `step_s` and at the times of the source's own samples. None looks
     between them for losses, with a grid of `STEP_S` for all else.
@@ -84,7 +86,7 @@ def separations(
     end_s = min(duration_s, until_s)
     count = regular_count(step_s or STEP_S, end_s)
     return [
-        RelativeFlight(source, number, step_s, count, end_s)
+        RelativeFlight(source, number, step_s, count, end_s, viewer)
         for number in range(len(source.targets))
     ]
 
@@ -96,21 +98,35 @@ class RelativeFlight:
     """
 
     def __init__(
-        self, source: Any, number: int, step_s: float | None, count: int, end_s: float
+        self,
+        source: Any,
+        number: int,
+        step_s: float | None,
+        count: int,
+        end_s: float,
+        viewer: int = -1,
     ) -> None:
-        self._source, self._number = source, number
-        #: Flights of ownship and target.
-        self.own, self.target = source.own, source.targets[number]
-        self.name: str = self.target.name
+        self._source = source
+        #: Which of the targets the two are; -1 for the ownship.
+        self.places = viewer, -1 if number == viewer else number
+        #: Flights of who looks (the ownship, if nothing else is said) and of the target.
+        self.own, self.target = (
+            source.own if place < 0 else source.targets[place] for place in self.places
+        )
+        self.name: str = self.target.name if number != viewer else source.roster.own_name
         self.between_samples = step_s is None
         self.step_s, self._count = step_s or STEP_S, count
         self.end_s = end_s
         self._known: list[Separation] | None = None
 
-    def flown_by(self, own: Any) -> "RelativeFlight":
-        """Return the same with another flight of the ownship."""
+    def flown(self, flights: Mapping[int, Any]) -> "RelativeFlight":
+        """Return the same with other flights of the ownship (-1) and of targets, by their index."""
         result = copy(self)
-        result.own, result._known = own, None
+        result.own, result.target = (
+            flights.get(place, nominal)
+            for place, nominal in zip(self.places, (self.own, self.target), strict=True)
+        )
+        result._known = None
         return result
 
     @property
@@ -127,7 +143,7 @@ class RelativeFlight:
         """Return 0 and the times within the grid at which the source itself has samples, s."""
         result = [np.zeros(1)]
         for times in self._samples():
-            result.append(_between(times, self._number, 0.0, self.grid_end_s))
+            result += [_between(times, n, 0.0, self.grid_end_s) for n in self._sampled]
         return np.unique(np.concatenate(result))
 
     def present_s(self) -> tuple[FloatArray, FloatArray]:
@@ -165,9 +181,16 @@ class RelativeFlight:
             time_s = regular_times_s(self.step_s, number)
             last_s = float(time_s[-1])
             for times in samples:
-                time_s = np.union1d(time_s, _between(times, self._number, after_s, last_s))
+                for number_sampled in self._sampled:
+                    new_s = _between(times, number_sampled, after_s, last_s)
+                    time_s = np.union1d(time_s, new_s)
             yield self.at(time_s)
             after_s = float(np.nextafter(last_s, np.inf))
+
+    @property
+    def _sampled(self) -> list[int]:
+        """Which targets' samples are those of the two."""
+        return [place for place in self.places if place >= 0]
 
     def _samples(self) -> list[SampleTimes]:
         every: list[SampleTimes] = self._source.sample_times()

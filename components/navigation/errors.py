@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from components.aircraft.aircraft import OWNSHIP as OWNSHIP_NAME
 from components.arguments.checks import (
     HIGHEST_ALTITUDE_M,
     LOWEST_ALTITUDE_M,
@@ -187,16 +188,17 @@ class NavigationErrors(_Navigation[Believing]):
     def build(self, block: Any) -> Believing:
         """Return what gives the belief at each instant.
 
-        All transforms of a scene share the ownship's one navigation system: its noise is keyed by
-        the instant, not by the block.
+        All transforms on a platform share its one navigation system: its noise is keyed by the
+        instant and the platform's name, not by the block.
         """
         navigation = block.context.sections["navigation"]
-        streams = block.context.streams
-        stream = streams.stream("[navigation]", "errors")
+        streams, platform = block.context.streams, block.context.platform
+        of_platform = "" if platform in ("", OWNSHIP_NAME) else f" of {platform}"
+        stream = streams.stream("[navigation]", f"errors{of_platform}")
         bias = (*navigation.position_bias_m, *_radians(navigation.attitude_bias_deg))
         noise = (*navigation.position_noise_m, *_radians(navigation.attitude_noise_deg))
         lasting = [
-            GaussMarkov(streams.stream("[navigation]", f"lasting {name}"), lasts_s)
+            GaussMarkov(streams.stream("[navigation]", f"lasting {name}{of_platform}"), lasts_s)
             if lasts_s
             else None
             for name, lasts_s in (

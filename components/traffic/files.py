@@ -5,7 +5,7 @@
 
 import math
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
@@ -164,6 +164,10 @@ class FileTraffic(RecordedTraffic):
 
     Parameters = FileTrafficParameters
     lockstep = True
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self._let_ownship_be(parameters.own_flight)
 
     def read(self) -> TrafficFile:
         """Return what is taken of the files."""

@@ -5,8 +5,8 @@ What each row holds is what a run alone would give, to the bit; a single run is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from components.aircraft.aircraft import Roster
 from components.flights.culling import NearIntervals
 from components.flights.fleet import Fleet
-from components.flights.many_flights import SteeredFleet
+from components.flights.many_flights import SteeredFleet, WithOthers
 from components.geometry import TrajectoryState
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.keyed_table import turns
@@ -35,16 +35,23 @@ class FlightsOfRuns(NamedTuple):
 class FlownFlights:
     """The flights of all runs with the manoeuvres that came so far; see `messages.known_flights`.
 
-    An ownship for each run, and the targets of run 0, those of run 1, and so on. For other instants
-    than those of rows, targets are there while `intervals` say that they may be near, and positions
-    are those of the last publication at `rates_hz` (runs,).
+    An ownship for each run, and the targets of run 0, those of run 1, and so on. `platforms` are
+    those that may be steered or looked from: the ownship (-1) first, and targets by their index,
+    one flight for each run. For other instants than those of rows, targets are there while the
+    `intervals` of who looks say that they may be near, and positions are those of the last
+    publication at `rates_hz` (runs,).
     """
 
-    own: SteeredFleet
+    platforms: Mapping[int, SteeredFleet]
     targets: Fleet
     crabbing: Sequence[Any] = ()
-    intervals: NearIntervals | None = None
+    intervals: Mapping[int, NearIntervals] = field(default_factory=dict)
     rates_hz: FloatArray | None = None
+
+    @property
+    def own(self) -> SteeredFleet:
+        """The ownships."""
+        return self.platforms[-1]
 
     @property
     def width(self) -> int:
@@ -59,36 +66,73 @@ class FlownFlights:
     @property
     def manoeuvre_count(self) -> int:
         """How many manoeuvres came so far, in all runs."""
-        return int(self.own.manoeuvre_count.sum())
+        return sum(int(fleet.manoeuvre_count.sum()) for fleet in self.platforms.values())
 
-    def own_at(
+    @property
+    def steered_targets(self) -> dict[int, SteeredFleet]:
+        """The targets that have got manoeuvres in any run, by their index."""
+        return {
+            index: fleet
+            for index, fleet in self.platforms.items()
+            if index >= 0 and fleet.manoeuvre_count.any()
+        }
+
+    def seen_from(self, viewer: int) -> tuple[Fleet, Fleet]:
+        """Return the flights of who looks, and of its targets, without any manoeuvre."""
+        own = self.platforms[viewer].nominal
+        if viewer < 0:
+            return own, self.targets
+        return own, WithOthers(self.targets, self.width, {viewer: self.own.nominal})
+
+    def as_flown(self) -> Fleet:
+        """Return the flights of the targets with all manoeuvres."""
+        steered = self.steered_targets
+        return WithOthers(self.targets, self.width, steered) if steered else self.targets
+
+    def platform_at(
         self,
+        platform: int,
         run: IntArray,
         time_s: FloatArray,
         known: IntArray | None = None,
         state: TrajectoryState | None = None,
     ) -> TrajectoryState:
-        """Return the states of the ownships of runs (n,), each at a time (n,) of its own, by the
-        first `known` of their manoeuvres, or all; `state` is what is known of them but for the
-        wind.
+        """Return the states of a platform in runs (n,), each at a time (n,) of its own, by the
+        first `known` of its manoeuvres, or all; `state` is what is known of them but for the wind.
         """
-        state = self.own.each(run, time_s, known) if state is None else state
+        fleet = self.platforms[platform]
+        state = fleet.each(run, time_s, known) if state is None else state
         for crabbing in self.crabbing:
-            speed_mps = self.own.ground_speeds_mps(run, time_s, known)
-            state = crabbing(state, speed_mps, self.own.fixed_attitudes_rad(run, time_s, known))
+            speed_mps = fleet.ground_speeds_mps(run, time_s, known)
+            state = crabbing(state, speed_mps, fleet.fixed_attitudes_rad(run, time_s, known))
         return state
 
     def targets_at(
-        self, target: IntArray, time_s: FloatArray, state: TrajectoryState | None = None
+        self,
+        target: IntArray,
+        time_s: FloatArray,
+        state: TrajectoryState | None = None,
+        known: IntArray | None = None,
     ) -> TrajectoryState:
         """Return the states of targets (n,), each at a time (n,) of its own; `state` is what is
-        known of them but for the wind.
+        known of them but for manoeuvres and the wind. Of manoeuvres the first `known` (n,
+        platforms) count, or all.
         """
         state = self.targets.each(target, time_s) if state is None else state
         for crabbing in self.crabbing:
             speed_mps = self.targets.ground_speeds_mps(target, time_s)
             state = crabbing(state, speed_mps, self.targets.fixed_attitudes_rad(target, time_s))
-        return state
+        if not (steered := self.steered_targets):
+            return state
+        run, column = np.divmod(target, self.width)
+        values = [part.copy() for part in state.arrays()]
+        for place, index in enumerate(self.platforms):
+            if index in steered and len(mine := np.flatnonzero(column == index)):
+                counts = None if known is None else known[mine, place]
+                flown = self.platform_at(index, run[mine], time_s[mine], counts)
+                for part, new in zip(values, flown.arrays(), strict=True):
+                    part[mine] = new
+        return TrajectoryState(*values)
 
     def states(
         self,
@@ -97,23 +141,47 @@ class FlownFlights:
         columns: IntArray,
         time_s: FloatArray,
         ahead_s: FloatArray | float,
+        viewer: int,
     ) -> tuple[TrajectoryState, TrajectoryState]:
-        """Return states of ownships and of targets; see `messages.known_flights.AllFlights`."""
+        """Return states of who looks and of targets; see `messages.known_flights.AllFlights`."""
         time_s = self._published_s(run, time_s) + ahead_s
-        runs, counts = (np.broadcast_to(of, time_s.shape).reshape(-1) for of in (run, known))
-        own = self.own_at(runs, time_s.reshape(-1), counts).reshaped(time_s.shape)
-        target = run * self.width + columns
-        times = np.broadcast_to(time_s, np.broadcast_shapes(time_s.shape, target.shape))
-        target = np.broadcast_to(target, times.shape).reshape(-1)
-        others = self.targets_at(target, times.reshape(-1))
-        if self.intervals is not None:
-            near = self.intervals.holds(target, times.reshape(-1), times.reshape(-1))
+        shape = np.broadcast_shapes(time_s.shape, run.shape, columns.shape)
+        looking = self._looking(viewer, run, known, time_s)
+        target, times, runs = (
+            np.broadcast_to(of, shape).reshape(-1)
+            for of in (run * self.width + columns, time_s, run)
+        )
+        counts = None
+        if self.steered_targets:
+            counts = np.broadcast_to(known, (*shape, known.shape[-1])).reshape(len(times), -1)
+        others = self.targets_at(target, times, known=counts)
+        if viewer >= 0:  # the two have changed places
+            places = np.broadcast_to(columns, shape).reshape(-1)
+            mine = np.flatnonzero(places == viewer)
+            counts = np.broadcast_to(known[..., 0], shape).reshape(-1)[mine]
+            own = self.platform_at(-1, runs[mine], times[mine], counts)
+            values = [part.copy() for part in others.arrays()]
+            for part, new in zip(values, own.arrays(), strict=True):
+                part[mine] = new
+            others = TrajectoryState(*values)
+        if viewer in self.intervals:
+            near = self.intervals[viewer].holds(target, times, times)
             others = replace(others, present=others.present & near)
-        return own, others.reshaped(times.shape)
+        return looking, others.reshaped(shape)
 
-    def own_states(self, run: IntArray, known: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of ownships; see `messages.known_flights.AllFlights`."""
-        return self.own_at(run, self._published_s(run, time_s), known)
+    def own_states(
+        self, run: IntArray, known: IntArray, time_s: FloatArray, viewer: int
+    ) -> TrajectoryState:
+        """Return states of who looks; see `messages.known_flights.AllFlights`."""
+        return self._looking(viewer, run, known, self._published_s(run, time_s))
+
+    def _looking(
+        self, viewer: int, run: IntArray, known: IntArray, time_s: FloatArray
+    ) -> TrajectoryState:
+        mine = known[..., list(self.platforms).index(viewer)]
+        runs, counts = (np.broadcast_to(of, time_s.shape).reshape(-1) for of in (run, mine))
+        state = self.platform_at(viewer, runs, time_s.reshape(-1), counts)
+        return state.reshaped(time_s.shape)
 
     def _published_s(self, run: IntArray, time_s: FloatArray) -> FloatArray:
         """Return the times of the last publications."""
@@ -125,22 +193,23 @@ class FlownFlights:
 
 
 class Coming(NamedTuple):
-    """A manoeuvre that has come, in which run and when."""
+    """A manoeuvre that has come, in which run, when, and for which of the platforms."""
 
     run: int
     tick: int
+    platform: int
     manoeuvre: Manoeuvre
 
 
-def arrived_manoeuvres(wake: Wake) -> list[Coming]:
-    """Return the manoeuvres that have come since the last wake."""
+def arrived_manoeuvres(wake: Wake, steers: Mapping[str, int]) -> list[Coming]:
+    """Return the manoeuvres that have come since the last wake; blocks steer which platform."""
     return [
-        Coming(*one)
+        Coming(run, tick, steers[new.source], Manoeuvre(*values))
         for new in wake.arrivals("manoeuvres")
-        for one in zip(
+        for run, tick, *values in zip(
             new.message.run.tolist(),
             new.tick.tolist(),
-            map(Manoeuvre, *(getattr(new.message, name).tolist() for name in Manoeuvre._fields)),
+            *(getattr(new.message, name).tolist() for name in Manoeuvre._fields),
             strict=True,
         )
     ]
@@ -152,7 +221,7 @@ def due_manoeuvres(wake: Wake, pending: list[Coming]) -> tuple[list[Coming], lis
     What comes after the last row is for the next wake: what is flown at the end of a run must not
     depend on how far a window reached beyond it.
     """
-    pending = sorted(pending, key=lambda one: (one.run, one.tick))
+    pending = sorted(pending, key=lambda one: one[:3])
     came = _instants(pending)
     row = next_of_run(wake.instants, came)  # the first that flies it, if it is of its ownship
     due = (row < len(wake)) & (wake.run[np.minimum(row, len(wake) - 1)] == came.run)
@@ -163,13 +232,13 @@ def due_manoeuvres(wake: Wake, pending: list[Coming]) -> tuple[list[Coming], lis
 def steered(
     own: SteeredFleet, due: list[Coming], wake: Wake, run: IntArray
 ) -> tuple[SteeredFleet, IntArray]:
-    """Return ownships that fly what has come, and how many manoeuvres each row of runs knows.
+    """Return a platform that flies what has come, and how many manoeuvres each row of runs knows.
 
     A row knows the manoeuvres that have come by its own instant, whatever came later in this wake.
     """
     known: IntArray = own.manoeuvre_count[run]
     came = _instants(due)
-    for one in turns(came.run):  # the first of every ownship, then the next
+    for one in turns(came.run):  # the first of every run, then the next
         ownship, ticks = came.run[one], came.tick[one]
         manoeuvres = [due[number].manoeuvre for number in one.tolist()]
         own = own.steered(ownship, ticks / wake.ticks_per_s, manoeuvres)

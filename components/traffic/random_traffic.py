@@ -92,7 +92,7 @@ class RandomTraffic(TrafficSource):
         aircraft = [p.aircraft] * len(names)
         if p.equipage_shares != EquipageShares():
             aircraft = with_shares(names, aircraft, p.equipage_shares, self.stream("equipage"))
-        self.roster = Roster.of(list(zip(names, aircraft, strict=True)))
+        self.roster = Roster.of(list(zip(names, aircraft, strict=True)), (own.name, own))
 
     def sample_times(self) -> list[SampleTimes]:
         """Return a regular grid over the run."""

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from components.aircraft.aircraft import Aircraft, Roster
+from components.aircraft.aircraft import OWNSHIP, Aircraft, Roster
 from components.aircraft.equipage import EquipageShares, with_shares
 from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
 from components.flights.closest_approach import KnownTimes, SampleTimes
@@ -16,6 +16,7 @@ from components.flights.fleet import Trajectory
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.formats.text_rows import TrafficFile
 from components.geometry import line_of_sight_ned
+from components.traffic.scripted import Ownship
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
@@ -176,13 +177,19 @@ class RecordedTraffic(TrafficSource):
         others = [craft for craft in self.content.aircraft if craft is not self.own]
         self.targets = SampledFleet(others)
         self.roster = roster_of(
-            [target.name for target in others], parameters.intruder, parameters.aircraft,
-            self.file_names(),
+            self.own.name, [target.name for target in others], parameters.intruder,
+            parameters.aircraft, self.file_names(),
         )  # fmt: skip
         if parameters.equipage_shares != EquipageShares():
             names, stream = self.roster.names, self.stream("equipage")
             shared = with_shares(names, self.roster.aircraft, parameters.equipage_shares, stream)
-            self.roster = Roster.of(list(zip(names, shared, strict=True)))
+            own = self.roster.own_name, self.roster.own_aircraft[0]
+            self.roster = Roster.of(list(zip(names, shared, strict=True)), own)
+
+    def _let_ownship_be(self, own: Ownship | None) -> None:
+        """Take what a scene says of its ownship, where it says it."""
+        if own is not None:
+            self.roster = replace(self.roster, own_name=own.name, own_aircraft=(own,))
 
     def own_flight(self) -> Trajectory:
         """Return the ownship's flight: the file's first aircraft, unless the scene says another."""
@@ -244,11 +251,12 @@ class RecordedTraffic(TrafficSource):
 
 
 def roster_of(
-    names: Sequence[str], default: Aircraft, others: dict[str, Aircraft], what: str
+    own: str, names: Sequence[str], default: Aircraft, others: dict[str, Aircraft], what: str
 ) -> Roster:
-    """Return the roster of named targets: `others` by name, `default` for the rest."""
+    """Return the roster of named targets and ownship: `others` by name, `default` for the rest."""
     for name in others:
-        if name not in names:
-            raise ValueError(f"aircraft.{name}: {what} has no such intruder"
+        if name not in (own, *names):
+            raise ValueError(f"aircraft.{name}: {what} has no such aircraft"
                              f"{did_you_mean(name, names)}")  # fmt: skip
-    return Roster.of([(name, others.get(name, default)) for name in names])
+    targets = [(name, others.get(name, default)) for name in names]
+    return Roster.of(targets, (OWNSHIP, others.get(own, default)))

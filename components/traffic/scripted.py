@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.aircraft.aircraft import Aircraft, Roster, joint_roster
+from components.aircraft.aircraft import OWNSHIP, Aircraft, Roster, joint_roster
 from components.flights.attitude import Wind, ground_speed_mps
 from components.flights.closest_approach import RegularTimes, SampleTimes
 from components.flights.legs import AnyLeg, Position
@@ -66,9 +66,10 @@ class Flight(Parameters):
         return self
 
 
-class Ownship(Flight):
-    """The ownship's start and flight."""
+class Ownship(Flight, Aircraft):
+    """The ownship's start and flight, and what other platforms see of it."""
 
+    name: str = Field(default=OWNSHIP, min_length=1, description="Name by which others know it.")
     lat_deg: float = Field(ge=-90, le=90, description="Latitude at the start, deg.")
     lon_deg: float = Field(description="Longitude at the start, deg.")
     alt_m: float = Field(description="Altitude at the start, m.")
@@ -133,7 +134,7 @@ class ScriptedTraffic(TrafficSource):
                 raise ValueError(f"{key}: the name {craft.name!r} is used more than once")
             used.add(craft.name)
         self.targets = _intruders(crafts, own.start, self.wind)
-        self.roster = Roster.of([(craft.name, craft) for craft in crafts])
+        self.roster = Roster.of([(craft.name, craft) for craft in crafts], (own.name, own))
 
     def flights_of_runs(
         self, parameters: Sequence[Any], make: Callable[[int], Any]
@@ -144,7 +145,9 @@ class ScriptedTraffic(TrafficSource):
         width = len(self.roster)
         if len(crafts) != width * len(own) or any(flight.legs for flight in (*own, *crafts)):
             return super().flights_of_runs(parameters, make)
-        roster = joint_roster(self.roster, [(craft.name, craft) for craft in crafts])
+        roster = joint_roster(
+            self.roster, *([(one.name, one) for one in of] for of in (crafts, own))
+        )
         if roster is None:
             return None
         origins = np.array([flight.start for flight in own], dtype=np.float64)

@@ -20,7 +20,6 @@ from components.flights.bounds import (
     check_above_terrain,
     check_on_raster,
     traffic_envelope,
-    true_reaches_m,
 )
 from components.flights.closest_approach import (
     STEP_S,
@@ -32,9 +31,8 @@ from components.flights.closest_approach import (
     look_between,
     present_together_s,
 )
-from components.flights.culling import SteeredCulling, near_intervals
 from components.flights.fleet import Fleet, Trajectory
-from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
+from components.flights.many_flights import OfEachRun, SteeredFleet, SteeredFlight, fleet_of
 from components.geometry import TrajectoryState
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import farthest_look
@@ -48,9 +46,10 @@ from components.traffic.flown_flights import (
     due_manoeuvres,
     steered,
 )
+from components.traffic.views import Seen, View
 from components.traffic.wind_effect import ATTITUDE
 from dsa_des.arrays.run_ticks import no_runs
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Context, Input, Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
@@ -92,9 +91,11 @@ def truth_is_recorded(context: Context, targets: int) -> bool:
 
 
 class TrafficSource(Component):
-    """Publishes where the ownship and its targets are.
+    """Publishes where all aircraft are.
 
-    When manoeuvres are wired to it, its ownship flies them from the time they come.
+    Manoeuvres that are wired to it steer what carries the block that sends them, from the time they
+    come. The ownship is the first of the platforms; what looks from another one sees that one in
+    the ownship's place and the ownship in its place.
 
     Subclasses set `own`, `targets` and `roster` when they are made, and say at which times their
     data hold samples.
@@ -104,8 +105,9 @@ class TrafficSource(Component):
         "manoeuvres": Input(
             Manoeuvres,
             "queued",
-            "Turns and climbs that the ownship has to fly.",
+            "Turns and climbs that what carries their sender has to fly.",
             required=False,
+            many=True,
         )
     }
     outputs = {"states": Output(TrafficStates, "Positions and attitudes of all aircraft.")}
@@ -136,6 +138,10 @@ class TrafficSource(Component):
         rate = parameters.update_rate_hz
         return None if rate is None else ClockSpec(rate, Fraction(0))
 
+    def platforms(self) -> Sequence[str]:
+        """Return the names of all aircraft, the ownship's first."""
+        return self.roster.own_name, *self.roster.names
+
     def offer(self, port: str) -> KnownTraffic:
         """Say what the targets are, and where they can be; to all blocks the same.
 
@@ -146,9 +152,10 @@ class TrafficSource(Component):
             self._offered = KnownTraffic(self.roster, envelope)
         return self._offered
 
-    def _envelope(self, reach_m: float, lasts_s: float) -> TrafficEnvelope:
+    def _envelope(self, reach_m: float, lasts_s: float, viewer: int) -> TrafficEnvelope:
         duration_s = float(self.context.duration_s) + lasts_s
-        envelope = traffic_envelope(self.own, self.targets, duration_s, reach_m)
+        flights = self._flights([viewer]).seen_from(viewer)
+        envelope = traffic_envelope(flights[0][0], flights[1], duration_s, reach_m)
         weather = self.context.sections.get("weather")
         if weather is not None and weather.wind_mps > 0.0:
             # In wind a nose may point anywhere.
@@ -156,44 +163,78 @@ class TrafficSource(Component):
         return envelope
 
     def setup(self) -> None:
-        """Learn how far sensors look; what stays beyond it is not moved."""
+        """Learn who looks and is steered, and how far sensors look; what is beyond is not moved."""
         self._check_terrain(self.own.at)
-        self._look = farthest_look(c.request for c in self.context.consumers)
+        #: Which platform each block steers.
+        self._steers = self._by_block()
+        asked: dict[int, list[Any]] = {-1: []}
+        for consumer in self.context.consumers:
+            asked.setdefault(self._index(consumer.platform), []).append(consumer.request)
+        self._looks = {viewer: farthest_look(requests) for viewer, requests in asked.items()}
         #: Whether the truth is recorded.
         self.says_truth = truth_is_recorded(self.context, len(self.roster))
-        flights = FlightsOfRuns(fleet_of([self.own]), self.targets, self.roster)
-        self._fly(flights, [self.p.update_rate_hz])
+        self._fly(self._flights([*asked, *self._steers.values()]), self.roster, [self.p])
         if self.context.producers:
             self.own = SteeredFlight(self.own, self._flown.own)
 
-    def _fly(self, flights: FlightsOfRuns, rates_hz: Sequence[Any]) -> None:
+    def _index(self, platform: str) -> int:
+        """Return which target a platform is; -1 for the ownship."""
+        names = self.roster.names
+        if platform in ("", self.roster.own_name):
+            return -1
+        if self.roster.own_name in names:
+            raise ValueError(
+                f"a target has the ownship's name, {self.roster.own_name!r}: what is on "
+                f"{platform!r} could not tell them apart; give one another name"
+            )
+        return names.index(platform)
+
+    def _by_block(self) -> dict[str, int]:
+        """Return which platform each block steers; one that two steer is refused."""
+        steering: dict[int, str] = {}
+        for producer in self.context.producers:
+            other = steering.setdefault(self._index(producer.platform), producer.block)
+            if other != producer.block:
+                raise ValueError(
+                    f"{other} and {producer.block} both steer {producer.platform!r}: one block "
+                    f"decides for each aircraft; put one of them on another (platform = ...), or "
+                    "leave its wire out"
+                )
+        return {block: platform for platform, block in steering.items()}
+
+    def _flights(self, platforms: Sequence[int]) -> FlownFlights:
+        """Return this run's own flights, with the ownship and targets as platforms."""
+        return _with_platforms(fleet_of([self.own]), self.targets, platforms)
+
+    def _fly(self, flights: FlownFlights, roster: Roster, parameters: Sequence[Any]) -> None:
         """Take the flights of all runs, of which this one is the first, and how they publish."""
-        self.roster = flights.roster
-        self._flown = FlownFlights(
-            SteeredFleet(flights.own),
-            flights.targets,
-            self.built(ATTITUDE),
-            rates_hz=None if None in rates_hz else np.array(rates_hz, dtype=np.float64),
-        )
+        self.roster = roster
+        rates = [p.update_rate_hz for p in parameters]
+        rates_hz = None if None in rates else np.array(rates, dtype=np.float64)
         #: Manoeuvres that have come, and are not flown by any row yet.
         self._pending: list[Coming] = []
-        self._all_columns = np.arange(len(self.roster))
         #: The targets that were moved last, and their fleet.
-        self._moved: tuple[IntArray, Fleet] = self._all_columns, self.targets
-        self._epochs: SteeredCulling | None = None
-        look, own, targets = self._look, flights.own, flights.targets
+        self._moved: tuple[IntArray, Fleet] = np.arange(len(roster)), flights.targets
         culls = not self.context.simulate_everything and self.clock_of(self.p) is None
-        if not culls or math.isinf(look.range_m):
-            return
-        end_s = float(self.context.duration_s) + look.lasts_s
-        if not self.context.producers:
-            self._reach_m = true_reaches_m(own, len(self.roster), end_s, look)
-            if not np.isinf(self._reach_m).all():
-                near = near_intervals(own, targets, self._reach_m, end_s)
-                self._flown = replace(self._flown, intervals=near)
-        elif look.lasts_s == 0.0 and not look.seeming:  # a steered ownship may come anywhere
-            self._reach_m = np.array([look.range_m])
-            self._epochs = SteeredCulling(own, targets, look.range_m, end_s)
+        steered = sorted(self._steers.values()) if self.context.producers else None
+        duration_s = float(self.context.duration_s)
+        #: What each platform may look at, the ownship's first.
+        self._views = [
+            View(
+                flights,
+                viewer,
+                look if culls else replace(look, range_m=math.inf),
+                duration_s + look.lasts_s,
+                None if steered is None else _seen_from(viewer, steered),
+            )
+            for viewer, look in self._looks.items()
+        ]
+        self._flown = replace(
+            flights,
+            crabbing=self.built(ATTITUDE),
+            rates_hz=rates_hz,
+            intervals={v.viewer: v.intervals for v in self._views if v.intervals is not None},
+        )
 
     def _check_terrain(self, own_at: FlightAt) -> None:
         """Refuse terrain that an ownship does not fly above."""
@@ -225,7 +266,8 @@ class TrafficSource(Component):
         for number in range(len(parameters)):
             self._check_terrain(partial(_one_of, flights.own, number))
         of_all = copy(self)
-        of_all._fly(flights, [p.update_rate_hz for p in parameters])
+        flown = _with_platforms(flights.own, flights.targets, [*self._flown.platforms])
+        of_all._fly(flown, flights.roster, parameters)
         return of_all
 
     def flights_of_runs(
@@ -234,90 +276,89 @@ class TrafficSource(Component):
         """Return the flights of runs with these parameters; None where their rosters do not fit."""
         own, targets = [], []
         aircraft: list[tuple[str, Aircraft]] = []
+        looking: list[tuple[str, Aircraft]] = []
         for source in map(make, range(len(parameters))):
             own.append(source.own)
             targets += list(source.targets)
             aircraft += zip(source.roster.names, source.roster.aircraft, strict=True)
-        roster = joint_roster(self.roster, aircraft)
+            looking.append((source.roster.own_name, source.roster.own_aircraft[0]))
+        roster = joint_roster(self.roster, aircraft, looking)
         return None if roster is None else FlightsOfRuns(fleet_of(own), fleet_of(targets), roster)
 
     @property
     def width(self) -> int:
         """Most targets that are moved at one time."""
-        intervals = self._flown.intervals
-        return len(self.roster) if intervals is None else intervals.most_at_once()
+        most = sum(view.most_at_once for view in self._views) + len(self._views) - 1
+        return min(most, len(self.roster))
 
     def left_out(self) -> list[str]:
         """Say how far targets matter."""
-        if self._flown.intervals is None and self._epochs is None:
-            return []
-        reach_km = self._reach_m[0] / 1000.0
-        return [f"targets beyond {reach_km:.2f} km: not moved, no sensor looks farther"]
+        said = []
+        for view in self._views:
+            if view.culls:
+                whose = "" if view.viewer < 0 else f" on {self.roster.names[view.viewer]}"
+                said.append(
+                    f"targets beyond {view.reach_m[0] / 1000.0:.2f} km: not moved, no sensor"
+                    f"{whose} looks farther"
+                )
+        return said
 
-    def run(self, wake: Wake) -> Message:
+    def run(self, wake: Wake) -> Message | None:
         """Return the state of all aircraft that may matter, at every instant."""
         # Flights that all runs share are those of one.
         run = wake.run if len(self._flown.own) > 1 else no_runs(len(wake))
         time_s = wake.time_s
         known = self._steer(wake, run)
-        own, columns, near = self._near(run, time_s)
-        states, culled = self._targets_at(run, columns, time_s), None
-        present = states.present & own.present[:, np.newaxis]
-        if near is not None:
-            present &= near
-            culled = len(self._all_columns) - near.sum(axis=1)
-        asked = self._look.lasts_s > 0.0
-        truth = replace(self._flown, intervals=None, rates_hz=None) if self.says_truth else None
+        seen = Seen(self._views, self._flown, run, time_s)
+        states = self._targets_at(run, seen.columns, time_s)
+        present, culled = seen.by_ownship(states.present)
+        others = seen.by_others(states.present, self.roster.names)
+        truth = replace(self._flown, intervals={}, rates_hz=None) if self.says_truth else None
+        asked = any(look.lasts_s > 0.0 for look in self._looks.values())
         return TrafficStates.of(
             wake.ticks,
-            own,
+            seen.own,
             states,
             present=present,
             roster=self.roster,
-            columns=columns,
+            columns=seen.columns,
             culled=culled,
+            present_to={name: there for name, (there, _) in others.items()} or None,
+            culled_to={name: count for name, (_, count) in others.items()} or None,
             flights=KnownFlights(self._flown, run, known) if asked else None,
             true_flights=None if truth is None else KnownFlights(truth, run, known),
             run_time_s=None if truth is None else time_s,
         )
 
     def _steer(self, wake: Wake, run: IntArray) -> IntArray:
-        """Let ownships fly what has come; return how many manoeuvres of its own each row knows."""
-        self._pending += arrived_manoeuvres(wake)
+        """Let platforms fly what has come; return how many manoeuvres of each every row knows."""
+        self._pending += arrived_manoeuvres(wake, self._steers)
         if not self._pending:
-            return self._flown.own.manoeuvre_count[run]
+            counts = [fleet.manoeuvre_count[run] for fleet in self._flown.platforms.values()]
+            return np.array(counts).T
         due, self._pending = due_manoeuvres(wake, self._pending)
-        own, known = steered(self._flown.own, due, wake, run)
-        self._flown = replace(self._flown, own=own)
-        if self._epochs is not None:
-            for one in due:
-                self._epochs.forget(one.run, one.tick / wake.ticks_per_s)
+        platforms, known = dict(self._flown.platforms), []
+        for platform, fleet in platforms.items():
+            mine = [one for one in due if one.platform == platform]
+            if platform >= 0:  # who is not there is not steered
+                there_s = fleet.nominal.intervals_present_s
+                seconds = [one.tick / wake.ticks_per_s for one in mine]
+                mine = [
+                    one
+                    for one, time_s in zip(mine, seconds, strict=True)
+                    if there_s[one.run, 0] <= time_s <= there_s[one.run, 1]
+                ]
+            platforms[platform], count = steered(fleet, mine, wake, run)
+            known.append(count)
+            for view in self._views:
+                if view.viewer == platform and view.epochs is not None:
+                    for one in mine:
+                        view.epochs.forget(one.run, one.tick / wake.ticks_per_s)
+        self._flown = replace(self._flown, platforms=platforms)
         assert isinstance(self.own, SteeredFlight)
-        self.own = SteeredFlight(self.own.flight, own)
-        return known
-
-    def _near(
-        self, run: IntArray, time_s: FloatArray
-    ) -> tuple[TrajectoryState, IntArray, BoolArray | None]:
-        """Return the ownship's state, which targets may come in reach, and when (rows, targets);
-        None for always.
-        """
-        flown, lasts_s, columns = self._flown, self._look.lasts_s, self._all_columns
-        if self._epochs is not None:
-            own, near = self._epochs.near(flown.own, run, time_s)
-            if len(flown.own) == 1:
-                columns = np.flatnonzero(near.any(axis=0))
-            return flown.own_at(run, time_s, state=own), columns, near[:, columns]
-        own = flown.own_at(run, time_s)
-        if flown.intervals is None:
-            return own, columns, None
-        if len(flown.own) == 1:
-            columns = flown.intervals.during(float(time_s.min()), float(time_s.max()) + lasts_s)
-            return own, columns, flown.intervals.near(columns, time_s, lasts_s)
-        each = (run[:, np.newaxis] * flown.width + columns).reshape(-1)
-        times = np.repeat(time_s, len(columns))
-        near = flown.intervals.holds(each, times, times + lasts_s)
-        return own, columns, near.reshape(len(time_s), len(columns))
+        self.own = SteeredFlight(self.own.flight, self._flown.own)
+        self.targets = self._flown.as_flown()
+        return np.stack(known, axis=1)
 
     def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return the states (rows, columns) of targets of each row's run."""
@@ -327,7 +368,7 @@ class TrafficSource(Component):
             if not np.array_equal(columns, self._moved[0]):
                 self._moved = columns, flown.targets.subset(columns)
             state = self._moved[1].at(time_s)
-            if not flown.crabbing:
+            if not flown.crabbing and not flown.steered_targets:
                 return state
             state = state.reshaped((-1,))
         each = (run[:, np.newaxis] * flown.width + columns).reshape(-1)
@@ -335,7 +376,7 @@ class TrafficSource(Component):
 
     def own_at(self, time_s: FloatArray) -> TrajectoryState:
         """Return the ownship's state, as it is known now, at times (n,), in wind."""
-        return self._flown.own_at(np.zeros(len(time_s), dtype=np.int64), time_s)
+        return self._flown.platform_at(-1, np.zeros(len(time_s), dtype=np.int64), time_s)
 
     def records(self) -> list[type[Message]]:
         """Return what is recorded: the truth where a scene is small, or asks for it."""
@@ -398,3 +439,16 @@ class TrafficSource(Component):
 def _one_of(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
     """Return the states of one flight of many at times (n,)."""
     return fleet.each(np.full(len(time_s), aircraft), time_s)
+
+
+def _with_platforms(own: Fleet, targets: Fleet, platforms: Sequence[int]) -> FlownFlights:
+    """Return the flights of all runs, with the ownship and targets by index as platforms."""
+    width = len(targets) // len(own)
+    others = sorted({index for index in platforms if index >= 0})
+    fleets = {index: SteeredFleet(OfEachRun(targets, width, index)) for index in others}
+    return FlownFlights({-1: SteeredFleet(own), **fleets}, targets)
+
+
+def _seen_from(viewer: int, platforms: Sequence[int]) -> list[int]:
+    """Return the places of platforms among the targets of who looks, itself left out."""
+    return [viewer if one < 0 else one for one in platforms if one != viewer]

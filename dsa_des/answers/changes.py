@@ -14,9 +14,9 @@ import numpy as np
 
 from dsa_des.answers.alternatives import AS_IT_IS, COLUMN
 from dsa_des.arrays.types import AnyArray, IntArray
-from dsa_des.results.differences import EstimatedDifference, difference, quantile_difference
+from dsa_des.results.differences import EstimatedDifference, difference
 from dsa_des.results.record import EVENT, RATIO, SHARE, TRIALS, Result
-from dsa_des.results.rows import Rows, paired
+from dsa_des.results.rows import Rows
 from dsa_des.results.statistics import Estimate
 
 #: Events that a ratio without a word of caution rests on, on either side.
@@ -95,13 +95,12 @@ def _change(
     rows: Rows, result: Result, model: str, at: tuple[Any, ...], own: Estimate,
     sides: tuple[IntArray, IntArray], confidence: float,
 ) -> PairedChange:  # fmt: skip
-    runs = rows.runs
-    _, here, there = np.intersect1d(runs[sides[0]], runs[sides[1]], return_indices=True)
-    pair = sides[0][here], sides[1][there]
-    differing = np.zeros(len(here), dtype=bool)
+    pair = rows.common(*sides)
+    runs = len(pair[0])
+    differing = np.zeros(runs, dtype=bool)
     for one, other in _columns(rows, result, pair):
         differing |= ~((one == other) | (_is_nothing(one) & _is_nothing(other)))
-    cut_off, neither = np.zeros(len(here), dtype=bool), 0
+    cut_off, neither = np.zeros(runs, dtype=bool), 0
     if result.kind != RATIO:
         missing = [_is_nothing(rows.column(result.name)[side]) for side in pair]
         neither = int((missing[0] & missing[1]).sum())
@@ -117,11 +116,11 @@ def _change(
         reason = f"{found.paired.count} runs are too few for an interval"
     presence = None
     if result.kind != RATIO and (found.only_first or found.only_second):
-        _, first, second = paired(rows, result.name, *pair)
+        _, first, second = rows.paired(result.name, *pair)
         has = [(~np.isnan(values)).astype(float) for values in (first, second)]
         presence = difference(has[0], has[1], confidence, kind=EVENT).paired
     return PairedChange(
-        model, result, at, own, found.paired, len(here), int(differing.sum()),
+        model, result, at, own, found.paired, runs, int(differing.sum()),
         found.only_first, found.only_second, neither, int(cut_off.sum()), presence,
         events, reason,
     )  # fmt: skip
@@ -131,18 +130,15 @@ def _difference(
     rows: Rows, result: Result, pair: tuple[IntArray, IntArray], confidence: float
 ) -> tuple[EstimatedDifference, str, float]:
     """Return the paired difference, why there is none, and the events a ratio rests on if few."""
-    if result.kind == RATIO:
-        ratios = [rows.ratio(result, side, confidence, "t")[0] for side in pair]
-        found = rows.ratio_difference(result, *pair, confidence)
-        events = min(ratio.mitigated_events for ratio in ratios)
-        few = float(events) if found.paired.few else math.inf
-        return found, next((ratio.reason for ratio in ratios if ratio.reason), ""), few
-    first, second = paired(rows, result.name, *pair)[1:]
-    if result.quantile is not None:
-        return quantile_difference(first, second, result.quantile, confidence), "", math.inf
     # Student's t also where the study's own means are bootstrapped: so many comparisons ask for
     # ends farther out than its resamples reach.
-    return difference(first, second, confidence, kind=result.kind), "", math.inf
+    found = rows.difference(result, *pair, confidence, "t")
+    if result.kind != RATIO:
+        return found, "", math.inf
+    ratios = [rows.ratio(result, side, confidence, "t")[0] for side in pair]
+    events = min(ratio.mitigated_events for ratio in ratios)
+    few = float(events) if found.paired.few else math.inf
+    return found, next((ratio.reason for ratio in ratios if ratio.reason), ""), few
 
 
 def _columns(

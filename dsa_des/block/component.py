@@ -60,6 +60,9 @@ class Context:
         What of ``[accuracy]`` the effects left out of this block have not used up, by quantity.
     rewinds : bool
         Whether the engine may take blocks of this run back to an instant before.
+    platform : str
+        What carries the block, of what another one names as `Component.platforms`: its key
+        ``platform``, or else what carries the blocks that feed it.
     """
 
     streams: Streams
@@ -74,6 +77,7 @@ class Context:
     recorded_tables: Collection[str] | None = None
     tolerance: Mapping[str, float] = field(default_factory=dict)
     rewinds: bool = False
+    platform: str = ""
 
 
 class Component:
@@ -173,6 +177,14 @@ class Component:
     def offer(self, port: str) -> Any:
         """Return what this block says of the output `port` to the blocks it feeds, or None."""
         return None
+
+    def platforms(self) -> Sequence[str]:
+        """Return the names of what it moves that may carry blocks; the first carries by default.
+
+        Its offers and messages are then seen from what carries the receiver
+        (`Message.seen_from`; an offer has a method of that name). Asked before offers.
+        """
+        return ()
 
     def records(self) -> Sequence[type[Message]]:
         """Return the message types whose tables this block fills, once effects are known.

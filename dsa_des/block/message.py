@@ -253,6 +253,10 @@ class Message(_Found):
             setattr(result, name, _pick(getattr(self, name), order))
         return result
 
+    def seen_from(self, platform: str) -> Self:
+        """Return the message as a block sees it that a platform carries (`Component.platforms`)."""
+        return self
+
     def of_runs(self, run: IntArray) -> Self:
         """Return the message as one of other runs."""
         result = self._copy()

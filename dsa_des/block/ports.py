@@ -68,11 +68,14 @@ class Consumer:
         Its input.
     request : object
         What its `Component.request` returned for that input.
+    platform : str
+        What carries it (`Component.platforms`); empty where nothing does.
     """
 
     block: str
     port: str
     request: Any
+    platform: str = ""
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,8 @@ class Producer:
         How much of that is drawn anew for every message.
     unforeseen : bool
         Whether they may come later still: they wait for a processor, or for a number of scans.
+    platform : str
+        What carries it; empty where nothing does.
     """
 
     block: str
@@ -101,3 +106,4 @@ class Producer:
     latest_s: Fraction = Fraction(0)
     jitter_s: Fraction = Fraction(0)
     unforeseen: bool = False
+    platform: str = ""

@@ -151,6 +151,7 @@ class Replicas(Timeline):
             Streams(scene.seed), self.scene.ticks_per_s, duration_s=face.duration_s,
             consumers=face.consumers, producers=face.producers, sections=scene.sections,
             recorded_runs=face.recorded_runs, recorded_tables=face.recorded_tables,
+            platform=face.platform,
         )  # fmt: skip
         block = scene.blocks[name]
         return block.cls(name, block.parameters, context)

@@ -21,7 +21,6 @@ from dsa_des.results.curves import (
 from dsa_des.results.labels import value_label
 from dsa_des.results.maps import Target, draw_heat, draw_map
 from dsa_des.results.record import FigureRecord
-from dsa_des.results.rows import paired
 from dsa_des.results.summary import Line, of_series
 from dsa_des.results.tables import Tables
 
@@ -154,7 +153,7 @@ def _draw_scatters(tables: Tables, axis: str, baseline: Any, only: Sequence[str]
     for value, others, base, chosen in tables.rows.against(axis, baseline):
         at = (*others[:index], value, *others[index:])
         for metric in tables.notable_results(only):
-            _, first, second = paired(tables.rows, metric, base, chosen)
+            _, first, second = tables.rows.paired(metric, base, chosen)
             name = "-".join(["scatter", metric, *map(str, at)])
             drawn = _stream(f"{safe_name(name)}.png")
             names = str(baseline), str(value)

@@ -17,8 +17,10 @@ from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.results.differences import (
     EstimatedDifference,
     RatioTerms,
+    difference,
     estimate_of,
     paired_units,
+    quantile_difference,
     ratio_difference,
 )
 from dsa_des.results.folder import StudyFolder
@@ -338,10 +340,33 @@ class Rows:
         terms = RatioTerms(below, above, weight, cluster, stands_for, predicted).of(known)
         return terms, rows[known], int((~known).sum())
 
-    def ratio_difference(
+    def common(self, first: IntArray, second: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the rows, of two sets of them, of the runs that both have, in pairs."""
+        runs = self.runs
+        _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
+        return first[here], second[there]
+
+    def paired(
+        self, name: str, first: IntArray, second: IntArray
+    ) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Return the units that both sets of rows have, and the values of each in both."""
+        values, (one, two) = self.column(name), self.common(first, second)
+        return paired_units(self.units[one], values[one].astype(float), values[two].astype(float))
+
+    def difference(
+        self, result: Result, first: IntArray, second: IntArray, confidence: float, method: str
+    ) -> EstimatedDifference:
+        """Return how a result differs between two conditions, on the runs that both have."""
+        if result.kind == RATIO:
+            return self._ratio_difference(result, first, second, confidence)
+        _, one, two = self.paired(result.name, first, second)
+        if result.quantile is not None:
+            return quantile_difference(one, two, result.quantile, confidence)
+        return difference(one, two, confidence, method, kind=result.kind)
+
+    def _ratio_difference(
         self, result: Result, first: IntArray, second: IntArray, confidence: float
     ) -> EstimatedDifference:
-        """Return how a ratio differs between two conditions on the runs that both have."""
         (one, mine, _), (two, other, _) = (self._paired(result, rows) for rows in (first, second))
         _, here, there = np.intersect1d(self.runs[mine], self.runs[other], return_indices=True)
         alone = len(mine) - len(here), len(other) - len(there)
@@ -361,9 +386,7 @@ class Rows:
             if weight is not None:
                 known &= ~np.isnan(self.column(weight)[rows].astype(float))
             sides.append(rows[known])
-        one, two = (self.runs[rows] for rows in sides)
-        _, here, there = np.intersect1d(one, two, return_indices=True)
-        below, above = sides[0][here], sides[1][there]
+        below, above = self.common(*sides)
         weights = None if weight is None else self.column(weight)[below].astype(float)
         return paired_ratio(
             self.column(name)[below].astype(float), self.column(name)[above].astype(float),
@@ -380,13 +403,3 @@ class Rows:
 
 def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
-
-
-def paired(
-    rows: Rows, name: str, first: IntArray, second: IntArray
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the units that both sets of rows have, and the values of each in both."""
-    values, runs = rows.column(name), rows.runs
-    _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
-    one, two = first[here], second[there]
-    return paired_units(rows.units[one], values[one].astype(float), values[two].astype(float))

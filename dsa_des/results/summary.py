@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dsa_des.results.differences import EstimatedDifference, difference, estimate_of
+from dsa_des.results.differences import EstimatedDifference, estimate_of
 from dsa_des.results.ratio import PairedRatio
 from dsa_des.results.record import (
     EVENT,
@@ -12,7 +12,7 @@ from dsa_des.results.record import (
     Requirement,
     Result,
 )
-from dsa_des.results.rows import Rows, paired
+from dsa_des.results.rows import Rows
 from dsa_des.results.statistics import Estimate, within
 
 
@@ -95,11 +95,7 @@ def compare_axis(
                 continue  # paired differences are of means
             if result.kind != RATIO and rows.is_sampled(result.name):
                 continue  # other runs were flown here than there
-            if result.kind == RATIO:
-                change = rows.ratio_difference(result, base, chosen, confidence)
-            else:
-                first, second = paired(rows, result.name, base, chosen)[1:]
-                change = difference(first, second, confidence, method, kind=result.kind)
+            change = rows.difference(result, base, chosen, confidence, method)
             ratio = None
             if result.kind == EVENT:
                 ratio = rows.event_ratio(result.name, base, chosen, weight, confidence)

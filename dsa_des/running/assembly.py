@@ -1,6 +1,6 @@
 """The blocks of a scene, built and set up: with their neighbours known and their effects built."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any
@@ -12,7 +12,9 @@ from dsa_des.record.recording import Recorder
 from dsa_des.running.effects import Planned, WrapEffect, build_effects
 from dsa_des.running.loops import telling_order
 from dsa_des.running.timeline import Timeline
+from dsa_des.scene.platforms import platforms_of
 from dsa_des.scene.scene import Scene
+from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK
 
 
@@ -48,6 +50,9 @@ class Assembly:
         self.components = self.stretches[0]
         self.duration_s = self._duration()
         self._refuse_late_changes()
+        #: Blocks that move what carries others, and the names of that.
+        self._sources = {n: names for n, c in self.components.items() if (names := c.platforms())}
+        self._put_on_platforms()
         #: Blocks that go on by what their neighbours said at first, and the stretch from which on
         #: these say otherwise: they do not say what they remember.
         self.unheard: dict[str, int] = {}
@@ -116,6 +121,13 @@ class Assembly:
                 message = f"something changes at {float(stretch.from_s):g} s, beyond {ends_s}"
                 raise SceneError([self._scene.problem("changes", message)])
 
+    def _put_on_platforms(self) -> None:
+        """Tell every block what carries it, which no change alters."""
+        self._platforms = platforms_of(self._scene, self._sources)
+        for components in self.stretches:
+            for name, platform in self._platforms.items():
+                components[name].context.platform = platform
+
     def _offer_down_the_chain(self, number: int) -> None:
         """Tell every block what its producers offer, sources first: a block may pass it on.
 
@@ -127,17 +139,18 @@ class Assembly:
                 Producer(
                     wire.source,
                     wire.input,
-                    self._asked(components[wire.source], "offer", wire.output),
+                    self._offer(wire, components),
                     wire.total_delay_s + Fraction(wire.jitter_s),
                     Fraction(wire.jitter_s),
                     wire.queued or wire.delay_scans > 0,
+                    components[wire.source].context.platform,
                 )
                 for wire in self._scenes[number].wires
                 if wire.target == name
             ]
             if number and components[name] is self.stretches[number - 1][name]:
-                told = components[name].context.producers
-                if _same(producers, told):
+                told_by = components[name]
+                if _same(producers, told_by.context.producers):
                     continue
                 if type(components[name]).remembers is None:
                     self.unheard.setdefault(name, number)
@@ -146,7 +159,16 @@ class Assembly:
                 with self._preparing(name, problems):
                     components[name] = self._made(name, number)
                 _raise_any(problems)
+                components[name].context.platform = told_by.context.platform
             components[name].context.producers = producers
+
+    def _offer(self, wire: Wire, components: Mapping[str, Component]) -> Any:
+        """Return what is offered over a wire, as what carries the receiver has it."""
+        offer = self._asked(components[wire.source], "offer", wire.output)
+        carrying = components[wire.target].context.platform
+        if carrying in self._sources.get(wire.source, ()):
+            return offer.seen_from(carrying)
+        return offer
 
     def _each(self, name: str) -> list[Component]:
         """Return the instances of a block, each once, in order of time."""
@@ -196,7 +218,8 @@ class Assembly:
                 of_wire: list[Consumer] = []
                 for target in self._each(wire.target):
                     asked = self._asked(target, "request", wire.input)
-                    consumer = Consumer(wire.target, wire.input, asked)
+                    platform = target.context.platform
+                    consumer = Consumer(wire.target, wire.input, asked, platform)
                     if not any(_same(consumer, one) for one in of_wire):
                         of_wire.append(consumer)
                 consumers += of_wire

@@ -45,6 +45,8 @@ class Channel:
         runs: Runs | None = None,
     ) -> None:
         self.source = source
+        #: From what carries the receiver messages are seen; empty for as they are.
+        self.platform = ""
         self.delay_ticks = delay_ticks
         self._faults = faults
         self._runs = Runs() if runs is None else runs
@@ -86,6 +88,8 @@ class Channel:
         own.
         """
         arrivals = message.instants
+        if self.platform:
+            message = message.seen_from(self.platform)
         if sent is not None:
             arrivals = RunTicks(message.run, np.full(len(message), sent, dtype=np.int64))
         if self.delay_ticks:

@@ -100,6 +100,9 @@ def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None
             declared = nodes[wire.target].component.inputs[wire.input].message
             channel.hold(declared.initial(wire.holds), 0)
         target = nodes[wire.target]
+        carrying = target.component.context.platform
+        if carrying in nodes[wire.source].component.platforms():
+            channel.platform = carrying
         target.channels.setdefault(wire.input, []).append(channel)
         nodes[wire.source].subscribers.setdefault(wire.output, []).append(
             (channel, target, wire.input)

@@ -26,6 +26,11 @@ class BlockOptions(Parameters):
     processor: str | None = Field(
         default=None, description="Shared processor that its messages go through."
     )
+    platform: str | None = Field(
+        default=None,
+        description="Name of the aircraft or place that carries it; by default that of the blocks "
+        "that feed it, else the ownship.",
+    )
     acknowledged: list[str] = Field(
         default=[],
         description="Notes on this block that are known and meant, each by how it begins (a key's "

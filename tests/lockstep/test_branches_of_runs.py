@@ -2,63 +2,11 @@
 
 import pyarrow.compute as pc
 from same_runs import same_as_alone, tables_of
+from wired import head_on_loop
 
+import dsa_des
 from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import branch
-
-#: Errors new at every look and errors that last, of sensors and of the ownship's own navigation,
-#: and a wire that loses and delays.
-LOOP = """
-title = "a turn that comes by chance"
-duration_s = 24
-seed = 1
-wires = [
-  "traffic -> transform -> gate -> radar -> fusion -> tracker",
-  { from = "tracker", to = "avoidance", drop_probability = 0.7, jitter_s = 0.4 },
-  { from = "avoidance", to = "traffic", delay_s = 1, holds = "nothing" },
-]
-[navigation]
-position_noise_m = [5, 5, 5]
-position_correlation_time_s = 20
-attitude_noise_deg = [0.1, 0.1, 0.1]
-[blocks.traffic]
-type = "traffic.scripted"
-ownship = { lat_deg = 52, lon_deg = 4, alt_m = 1000, speed_mps = 50 }
-[[blocks.traffic.intruders]]
-name = "ahead"
-east_m = 0
-north_m = 3000
-up_m = 0
-heading_deg = 180
-speed_mps = 50
-[blocks.transform]
-type = "geometry.ellipsoid"
-[blocks.gate]
-type = "gate"
-[blocks.radar]
-type = "radar.range_boundary"
-scan_rate_hz = 1
-range_km = 4
-azimuth_beamwidth_deg = 5.8
-elevation_beamwidth_deg = 5.8
-range_cell_m = 76.2
-errors = "stated"
-azimuth_error_deg = 1
-elevation_error_deg = 1
-elevation_correlation_time_s = 8
-range_error_m = 20
-range_bias_m = 5
-[blocks.fusion]
-type = "fusion.pick_best"
-[blocks.tracker]
-type = "tracking.stub"
-[blocks.avoidance]
-type = "avoidance.turn_away"
-range_km = 5
-turn_deg = 90
-rate_deg_s = 6
-"""
 
 
 def branches_agree(scene, late_s, later_s):
@@ -84,10 +32,23 @@ def branches_agree(scene, late_s, later_s):
         assert differ
 
 
-def test_a_branch_is_its_run_up_to_the_branch(tmp_path):
-    (tmp_path / "loop.toml").write_text(LOOP)
-    branches_agree(load_scene(tmp_path / "loop.toml"), 8, 15)
+def test_a_branch_is_its_run_up_to_the_branch():
+    """With errors that last, of the navigation too, and a wire that loses and delays."""
+    loop = head_on_loop(
+        {
+            "range_km": 4, "errors": "stated", "azimuth_error_deg": 1, "elevation_error_deg": 1,
+            "elevation_correlation_time_s": 8, "range_error_m": 20, "range_bias_m": 5,
+        },
+        {"drop_probability": 0.7, "jitter_s": 0.4}, north_m=3000, duration_s=24,
+        navigation={
+            "position_noise_m": [5, 5, 5], "position_correlation_time_s": 20,
+            "attitude_noise_deg": [0.1, 0.1, 0.1],
+        },
+    )  # fmt: skip
+    branches_agree(dsa_des.load_scene(loop), 8, 15)
 
 
 def test_branches_with_a_filter_and_a_pilot():
-    branches_agree(load_scene("configs/avoidance/crossing_tracked.toml", duration_s="50"), 20, 35)
+    branches_agree(
+        dsa_des.load_scene("configs/avoidance/crossing_tracked.toml", duration_s="50"), 20, 35
+    )

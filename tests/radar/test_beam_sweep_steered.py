@@ -155,7 +155,11 @@ def test_rows_keep_the_flights_they_know() -> None:
         def __init__(self, count: int) -> None:
             self.manoeuvre_count = count
 
-        def states(self, run: Any, known: Any, columns: Any, time_s: Any, ahead_s: Any) -> Any:
+        def states(
+            self, run: Any, known: Any, columns: Any, time_s: Any, ahead_s: Any, viewer: int
+        ) -> Any:
+            assert viewer == -1
+            known = known[..., 0]
             assert (known <= self.manoeuvre_count).all()
             zero = np.zeros(time_s.shape)
             north = zero + 100 * run + known
@@ -166,7 +170,7 @@ def test_rows_keep_the_flights_they_know() -> None:
 
     runs, knows = np.array([0, 0, 0, 0, 7, 7, 7]), np.array([0, 1, 1, 1, 1, 3, 2])
     parts = [
-        KnownFlights(Manoeuvres(count), runs[rows], knows[rows])
+        KnownFlights(Manoeuvres(count), runs[rows], knows[rows, np.newaxis])
         for count, rows in ((1, slice(0, 3)), (4, slice(3, 4)), (3, slice(4, 7)))
     ]
     joined = KnownFlights.join_rows(parts)

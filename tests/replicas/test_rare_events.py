@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from wired import head_on_loop
 
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
@@ -171,51 +172,12 @@ def test_branches_come_from_each_run_as_often_as_it_weighs():
 
 #: A radar sees an aircraft that comes head-on from 3 km on; every second a track is told, or lost.
 #: Only a turn that is told at one of the first 21 tracks keeps clear of an NMAC.
-LATE = """
-title = "a turn that comes late"
-duration_s = 36
-seed = 1
-wires = [
-  "traffic -> transform -> gate -> radar -> fusion -> tracker",
-  { from = "tracker", to = "avoidance", drop_probability = 0.5 },
-  { from = "avoidance", to = "traffic", delay_s = 1, holds = "nothing" },
-]
-[blocks.traffic]
-type = "traffic.scripted"
-ownship = { lat_deg = 52, lon_deg = 4, alt_m = 1000, speed_mps = 50 }
-[[blocks.traffic.intruders]]
-name = "ahead"
-east_m = 0
-north_m = 3300
-up_m = 0
-heading_deg = 180
-speed_mps = 50
-[blocks.transform]
-type = "geometry.ellipsoid"
-[blocks.gate]
-type = "gate"
-[blocks.radar]
-type = "radar.range_boundary"
-scan_rate_hz = 1
-range_km = 3
-azimuth_beamwidth_deg = 5.8
-elevation_beamwidth_deg = 5.8
-range_cell_m = 76.2
-[blocks.fusion]
-type = "fusion.pick_best"
-[blocks.tracker]
-type = "tracking.stub"
-[blocks.avoidance]
-type = "avoidance.turn_away"
-range_km = 5
-turn_deg = 90
-rate_deg_s = 6
-"""
+LATE = head_on_loop({"range_km": 3}, {"drop_probability": 0.5}, north_m=3300, duration_s=36)
 
 
 def study_of(folder, **keys):
     """A study of it by splitting, ready to run."""
-    (folder / "late.toml").write_text(LATE)
+    (folder / "late.toml").write_text(to_toml(LATE))
     tables = {
         "scene": str(folder / "late.toml"), "metrics": ["well_clear"], "replicas": 4,
         "splitting": {"event": "nmac", "runs": 10, "levels": [24, 20]},

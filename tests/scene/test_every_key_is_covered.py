@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from parameter_keys import every_key
 
+from components.aircraft.aircraft import Aircraft
+
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "reference" / "tests.md"
 TESTS = [
@@ -35,6 +37,13 @@ UNCOVERED: dict[str, str] = {
         key: "traffic.scripted's ownship: tests/traffic/scenes/test_files_of_any_kind.py flies it"
         for key in every_key()
         if key.startswith("traffic.") and key.split(".")[2] == "own_flight"
+    },
+    **{
+        key: "an ownship is an aircraft as intruders are: tests/platforms compares both"
+        for key in every_key()
+        if (part := key.partition("ownship.")[2])
+        and part.partition(".")[0] in {*Aircraft.model_fields, "name"}
+        and key not in ("traffic.scripted.ownship.name", "traffic.random.ownship.name")
     },
     # The camera of pictures is one of these; what its own tests do not see.
     **{

@@ -4,9 +4,16 @@ A fix is (time in s since 1970, latitude, longitude in deg, altitude in m); a fl
 them.
 """
 
+import random
 import struct
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from components.formats.recorded.known_kinds import record
+from components.formats.text_rows import TrafficFileError
 
 Fix = tuple[float, float, float, float]
 Flights = Mapping[str, Sequence[Fix]]
@@ -173,3 +180,30 @@ def pcapng(payloads: Iterable[tuple[float, bytes]]) -> bytes:
         head = struct.pack("<5I", 0, ticks >> 32, ticks & 0xFFFFFFFF, *[len(frame)] * 2)
         parts.append(block(6, head + frame))
     return b"".join(parts)
+
+
+def assert_refused_or_whole(path: Path, whole: bytes) -> None:
+    """Check that damaged copies of a file, read from a path, give one error or whole flights."""
+    rng = random.Random(path.name)
+    for _ in range(50):
+        raw = bytearray(whole)
+        for _ in range(rng.choice((1, 1, 2, 5))):
+            at = rng.randrange(len(raw) or 1)
+            kind = rng.random()
+            if kind < 0.4:
+                raw[at : at + 1] = rng.randbytes(1)
+            elif kind < 0.6:
+                del raw[at : at + rng.randrange(1, 40)]
+            elif kind < 0.8:
+                raw[at:at] = rng.randbytes(rng.randrange(1, 9))
+            else:
+                raw = raw[: max(at, 1)]
+        path.write_bytes(bytes(raw))
+        try:
+            file = record(path).flights()
+        except TrafficFileError as error:
+            assert 1 <= len(error.problems) <= 20
+            continue
+        for one in file.aircraft:
+            states = one.at(one.sample_times_s).arrays()
+            assert all(np.isfinite(values).all() for values in states)

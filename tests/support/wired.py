@@ -56,6 +56,33 @@ def chain(
     return deepcopy(scene)
 
 
+def head_on_loop(
+    radar: Mapping[str, Any], wire: Mapping[str, Any], *, north_m: float, **sections: Any
+) -> dict[str, Any]:
+    """Return a closed loop: an aircraft comes head-on, and one of its tracks makes us turn.
+
+    `wire` says how the one to the avoidance delays or loses them.
+    """
+    level = {"speed_mps": 50}
+    scene = chain(
+        {"radar": {
+            "type": "radar.range_boundary", "scan_rate_hz": 1, "range_cell_m": 76.2,
+            "azimuth_beamwidth_deg": 5.8, "elevation_beamwidth_deg": 5.8, **radar,
+        }},
+        ownship={"lat_deg": 52, "lon_deg": 4, "alt_m": 1000, **level},
+        targets=[{"name": "ahead", "east_m": 0, "north_m": north_m, "up_m": 0, "heading_deg": 180,
+                  **level}],
+        fusion={"type": "fusion.pick_best"}, tracker={"type": "tracking.stub"}, **sections,
+    )  # fmt: skip
+    turn = {"type": "avoidance.turn_away", "range_km": 5, "turn_deg": 90, "rate_deg_s": 6}
+    scene["blocks"]["avoidance"] = turn
+    scene["wires"] += [
+        {"from": "tracker", "to": "avoidance", **wire},
+        {"from": "avoidance", "to": "traffic", "delay_s": 1, "holds": "nothing"},
+    ]
+    return scene
+
+
 def run(scene: Mapping[str, Any]) -> Any:
     """Run a scene in memory and record every look."""
     return dsa_des.run({**scene, "record": {"looks": True, **scene.get("record", {})}})
