@@ -15,7 +15,7 @@ from dsa_des.block.component import Component, Context, Parameters, as_written
 from dsa_des.block.foreign_calls import REFUSALS, must_pass, why_refused
 from dsa_des.block.registry import section_models
 from dsa_des.errors import Problem, SceneError, UsageError, did_you_mean
-from dsa_des.scene.block_table import Block, ProcessorParameters
+from dsa_des.scene.block_table import Block, Outage, ProcessorParameters
 from dsa_des.scene.changes import (
     CHANGES,
     Stretch,
@@ -31,6 +31,7 @@ from dsa_des.scene.checks import (
     read_blocks,
     read_clocks,
     read_duration,
+    read_outages,
     read_processors,
     read_sections,
     read_seed,
@@ -38,7 +39,6 @@ from dsa_des.scene.checks import (
 )
 from dsa_des.scene.graph import build_graph, check_graph
 from dsa_des.scene.keys import Key, dotted, key_in
-from dsa_des.scene.outages import OUTAGES, Outage, read_outages
 from dsa_des.scene.overrides import (
     IN_SET,
     IN_SWAP,
@@ -54,7 +54,8 @@ from dsa_des.text.safe_text import printable, shortened
 from dsa_des.time.randomness import Streams
 
 _TOP_LEVEL = (
-    "title", "description", "duration_s", "seed", "blocks", "wires", "processors", CHANGES, OUTAGES,
+    "title", "description", "duration_s", "seed", "blocks", "wires", "processors", "outages",
+    CHANGES,
 )  # fmt: skip
 _TOLERANCE = "accuracy"
 # Of what a scene is shown as in Python.
@@ -265,7 +266,7 @@ class Scene:
             tables[CHANGES] = [change.written() for change in self.changes]
         if self.outages:
             written = (one.model_dump(mode="json", exclude_none=True) for one in self.outages)
-            tables[OUTAGES] = list(written)
+            tables["outages"] = list(written)
         if self.processors:
             tables["processors"] = {
                 name: parameters.model_dump(mode="json")

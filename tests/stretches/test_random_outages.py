@@ -8,7 +8,7 @@ from test_changes_while_a_run_lasts import change, scans_of, scene
 
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.errors import SceneError
-from dsa_des.scene.outages import Outage
+from dsa_des.scene.block_table import Outage
 from dsa_des.stretches.outages import Outages
 from dsa_des.time.randomness import Streams
 from dsa_des.time.runs import Runs
