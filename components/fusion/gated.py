@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from components.fusion.fusion_block import FUSION_LADDER, Fusion, how_late_s, poses
+from components.fusion.fusion_block import Fusion, how_late_s, poses
+from components.fusion.ladder import FUSION_LADDER
 from components.geometry import (
     angle_by_haversine,
     body_angles,

@@ -34,8 +34,9 @@ from dsa_des.time.clock import MAX_TICK, ScanCursor, parse_rational
 
 EMBED = "dsa_des.embed"
 
-#: A host may add up so many steps of its own from one call to the next.
+#: A host may add up so many steps of its own from one call to the next, or in a second.
 _SUBSTEPS = 16
+_STEPS_PER_S = 1000
 #: What a time may be off a scan that is meant: never more than this part of the host's step.
 _NEAR = 100
 
@@ -161,7 +162,7 @@ class HostDriven:
         self.components = self.simulation.components
         #: Tick of the last call, -1 before the first.
         self.last_tick = -1
-        self._calls = 0
+        self._calls, self._first_tick = 0, 0
         names = set(scene.blocks) if wanted is None else set(wanted)
         self._runners = self._make_runners(names.union(*(ancestors(scene.graph, n) for n in names)))
         self._cursors = {r.name: r.cursor for r in self._runners if r.cursor is not None}
@@ -183,7 +184,7 @@ class HostDriven:
     def tick_of(self, time_s: object) -> int:
         """Return the tick nearest to a time: a number, or a text such as "1/3".
 
-        A number that lies as near to a scan as its own rounding, and that of all calls added up,
+        A number that lies as near to a scan as its own rounding, and that of all steps added up,
         may have led it means that scan. ValueError if it is not finite and from 0 on, or too large
         for 64-bit ticks.
         """
@@ -211,7 +212,9 @@ class HostDriven:
             raise ValueError(
                 f"time_s is {time_s}: it must lie from 0 to {MAX_TICK / self.ticks_per_s:g}"
             )
-        drift = int((1 + _SUBSTEPS * self._calls) * ulp_s * self.ticks_per_s)
+        elapsed = tick - self._first_tick if self._calls else 0
+        steps = max(_SUBSTEPS * self._calls, _STEPS_PER_S * elapsed // self.ticks_per_s)
+        drift = int((1 + steps) * ulp_s * self.ticks_per_s)
         return self._meant(tick, drift) if drift else tick
 
     def _meant(self, tick: int, drift: int) -> int:
@@ -249,6 +252,7 @@ class HostDriven:
                 f"{self.last_tick / self.ticks_per_s:g}"
             )
         if self.last_tick < 0 < tick:
+            self._first_tick = tick
             for cursor in self._cursors.values():
                 cursor.seek(tick)
         self.last_tick = tick

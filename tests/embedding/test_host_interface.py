@@ -405,6 +405,21 @@ def test_a_host_that_adds_up_its_steps_makes_every_scan_at_its_own_call(
     assert most > 0.5e-9  # else this shows nothing
 
 
+def test_a_host_that_adds_up_its_steps_and_calls_now_and_then_makes_scans_at_their_calls(scene):
+    """500 steps of 0.01 s from one call to the next: 710 s comes out as 709.9999999994993."""
+    simulator = Simulator(scene, sets=[
+        *(f"blocks.{name}.scan_rate_hz=0.2" for name in ("radar", "eo", "ir")),
+        *(f"blocks.{name}.offset_s=0" for name in ("radar", "eo", "ir")),
+    ])  # fmt: skip
+    simulator.start()
+    (chain,) = simulator._chains
+    times = list(itertools.islice(summed(0.01), 75_000))
+    assert 710.0 - times[71_000] > 0.5e-9
+    for call in range(0, 75_000, 500):
+        assert len(chain.due(chain.tick_of(times[call])).scans) == 3, times[call]
+        assert not chain.due(chain.tick_of(times[call + 1])).scans
+
+
 def test_sightings_are_those_of_a_host_that_counts_its_steps(scene):
     """A million seconds in, sums of steps leave the ticks at once."""
     simulators = [Simulator(scene) for _ in range(2)]
