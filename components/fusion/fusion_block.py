@@ -44,6 +44,7 @@ class Fusion(Component):
     inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
     outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
     also_records = (FusedWithPose,)
+    remembers = ("_recent", "_tries")
     windowed = True
     lockstep = True
     rewindable = True

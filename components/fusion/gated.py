@@ -2,7 +2,7 @@
 
 import math
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -130,6 +130,8 @@ def nearest_in_gate(one: Entries, anchors: IntArray, other: Entries, gates: Gate
 
 class GatedParameters(Parameters):
     """Parameters of gated fusion."""
+
+    may_change: ClassVar[tuple[str, ...]] = ("angle_gate_deg", "range_gate_m")
 
     time_gate_s: NonNegativeRational = Field(
         default=Fraction(1, 10),

@@ -29,6 +29,12 @@ def test_a_random_scene_gives_the_same_however_it_is_run(seed, tmp_path):
     assert verdict.kind == "same", verdict.detail
 
 
+@pytest.mark.parametrize("seed", range(9_300_000, 9_300_003))
+def test_a_random_scene_that_changes_gives_the_same_however_it_is_run(seed, tmp_path):
+    verdict = judge(legal_case(seed, tmp_path, changing=1), tmp_path, LIMIT_S)
+    assert verdict.kind == "same", verdict.detail
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", MORE)
 def test_many_random_scenes_give_the_same_however_they_are_run(seed, tmp_path):
@@ -91,6 +97,7 @@ def test_the_generator_leaves_nothing_out(tmp_path):
         "delay_s traffic -> transform", "jitter_s fusion -> tracker",
         "drop_probability sensor -> fusion", "cue loop", "fusion.covariance_intersection",
         "tracker that estimates", "late looks that count", "fusion.pass_through",
+        "changes enabled", "changes scan_rate_hz", "changes delay_s", "changes for a while",
     }  # fmt: skip
     for seed in range(9_200_000, 9_200_120):
         wanted -= legal_case(seed, tmp_path).features
