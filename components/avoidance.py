@@ -2,7 +2,7 @@
 
 import math
 from fractions import Fraction
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -66,6 +66,7 @@ class TurnOut(Component):
     inputs = {"alerts": Input(AlertLevels, "trigger", "The alert level of each target.")}
     outputs = {"manoeuvres": Output(Manoeuvres, "What the ownship is told to fly.")}
     Parameters = TurnOutParameters
+    remembers = ("_free_from", "_stuck")
     windowed = True
     lockstep = True
     rewindable = True
@@ -154,6 +155,8 @@ class TurnOut(Component):
 class TurnAwayParameters(Parameters):
     """Parameters of turning away."""
 
+    may_change: ClassVar[tuple[str, ...]] = ("range_km", "turn_deg", "pause_s")
+
     range_km: float = Field(default=5.0, gt=0, description="Turn for tracks nearer than this, km.")
     without_range: bool = Field(
         default=False,
@@ -206,6 +209,7 @@ class TurnAway(Component):
     inputs = {"tracks": Input(Tracks, "trigger", "What is held of every target.")}
     outputs = {"manoeuvres": Output(Manoeuvres, "Turns that the ownship is told to fly.")}
     Parameters = TurnAwayParameters
+    remembers = ("_free_from", "_rangeless")
     windowed = True
     lockstep = True
     rewindable = True

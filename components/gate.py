@@ -41,12 +41,12 @@ class Gate(Component):
         return self.context.producers[0].offer if self.context.producers else None
 
     def setup(self) -> None:
-        """Learn the reach of every sensor downstream."""
-        self._reach = {
-            consumer.block: consumer.request
-            for consumer in self.context.consumers
-            if isinstance(consumer.request, Reach)
-        }
+        """Learn the reach of every sensor downstream; one whose reach changes decides by itself."""
+        reaches: dict[str, list[Reach]] = {}
+        for consumer in self.context.consumers:
+            if isinstance(consumer.request, Reach):
+                reaches.setdefault(consumer.block, []).append(consumer.request)
+        self._reach = {sensor: of[0] for sensor, of in reaches.items() if len(of) == 1}
 
     def run(self, wake: Wake) -> Message | None:
         """Decide at every instant, for the sensors that scan then."""

@@ -79,6 +79,7 @@ class DaidalusAlerting(Component):
     }
     outputs = {"alerts": Output(AlertLevels, "The alert level of each target.")}
     Parameters = DaidalusParameters
+    remembers = ("_roster", "_belief", "_own", "_memory")
     windowed = True
     lockstep = True
     verified = (

@@ -43,6 +43,7 @@ class MOfNAlerts(Component):
     }
     outputs = {"alerts": Output(AlertLevels, "The same with filtered levels.")}
     Parameters = MOfNParameters
+    remembers = ("_memory",)
     windowed = True
     lockstep = True
 

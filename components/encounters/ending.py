@@ -50,6 +50,7 @@ class ClosestApproachPassed(Component):
     inputs = {"states": Input(TrafficStates, "sampled", "Where all aircraft are.")}
     outputs = {"end": Output(RunEnd, "That the run is over; it need not be wired.")}
     Parameters = ClosestApproachPassedParameters
+    remembers = ("_known",)
     windowed = True
     lockstep = True
     rewindable = True

@@ -3,10 +3,12 @@
 They are ``[weather]``, ``[accuracy]``, ``[navigation]`` and ``[terrain]``.
 """
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from components.atmosphere.pressure_altitude import STANDARD_HPA
 from components.terrain.raster import RasterFile
 from dsa_des.block.component import Parameters
 from dsa_des.time.gauss_markov import LONGEST_S
@@ -14,6 +16,12 @@ from dsa_des.time.gauss_markov import LONGEST_S
 
 class Weather(Parameters):
     """The weather; by default there is none, and sensors look through empty space."""
+
+    may_change: ClassVar[tuple[str, ...]] = (
+        "gas", "vapour_density_g_m3", "rain_rate_mm_h", "rain_top_m", "fog_water_g_m3",
+        "fog_base_m", "fog_top_m", "fog_temperature_c", "visibility_km", "night", "qnh_hpa",
+        "temperature_offset_c",
+    )  # fmt: skip
 
     gas: bool = Field(
         default=False, description="Whether oxygen and water vapour attenuate radar (P.676)."
@@ -52,6 +60,20 @@ class Weather(Parameters):
     )
     wind_from_deg: float = Field(
         default=0.0, ge=-360, le=360, description="Where the wind comes from, deg from north."
+    )
+    qnh_hpa: float = Field(
+        default=STANDARD_HPA,
+        ge=850,
+        le=1100,
+        description="Pressure at sea level, hPa: with another than the standard's, pressure "
+        "altitudes, which transponders report, are no heights.",
+    )
+    temperature_offset_c: float = Field(
+        default=0.0,
+        ge=-60,
+        le=60,
+        description="How much warmer than the standard atmosphere the air is at every height, "
+        "deg C; for pressure altitudes.",
     )
     night: bool = Field(
         default=False,
@@ -202,6 +224,13 @@ class Terrain(Parameters):
         description="Height of the raster's zero above the ellipsoid, m: the geoid's undulation "
         "where altitudes are above the ellipsoid.",
     )
+
+    def ground_m(self, lat_deg: float, lon_deg: float) -> float | None:
+        """Return the height of the ground above the ellipsoid; None where none is known."""
+        if self.raster is None:
+            return self.height_m
+        heights, inside = self.raster.raster.height(np.array([lat_deg]), np.array([lon_deg]))
+        return float(heights[0]) + self.raster_offset_m if inside[0] else None
 
     def without_effect(self) -> list[str]:
         """Say which keys belong to ground that there is not, and where ground is made up."""

@@ -23,6 +23,7 @@ import numpy as np
 from components.estimation.batched import (
     product,
     product_transposed,
+    selected,
     squared_length,
     symmetric,
     times,
@@ -41,6 +42,8 @@ NORTH, EAST, HEIGHT, SPEED_NORTH, SPEED_EAST, CLIMB, BEARING, RANGE, LATENCY = r
 _MOVING = 6
 # Up to this share of it a late position is as late as before.
 _SAME_WAY = 0.1
+# Less than this of m² or m²/s² is nothing; and what rounding may make of a correlation of 1.
+_LEAST_VARIANCE, _ONE = 1e-9, 1.0 + 1e-6
 # Steeper than this (as a share of the range) a bearing is none.
 _LEVEL = 1e-3
 
@@ -307,6 +310,7 @@ class Ages:
             moments = self._turned_back(moments, model, state, covariance)
         speeds = np.stack([covariance[i, i] for i in (3, 4, 5)])
         error, shared = self.errors(model, state, speeds)
+        shared = _possible(shared, error, covariance)
         known, seen = slope.shape[1], moments.jacobian.shape[1]
         new = product_transposed(product(slope, error[:known, :known]), slope)
         with_state = product_transposed(shared[:, :known], slope)  # (d, m, n)
@@ -349,3 +353,27 @@ class Ages:
             moments, expected=moments.expected + times(slope, off), total=symmetric(total),
             cross=moments.cross + with_state, jacobian=jacobian,
         )  # fmt: skip
+
+
+def _possible(shared: FloatArray, error: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return what states and errors share (d, k, n), as much less as they must have in common.
+
+    A track that later reports brought back to a late one knows some of what changed in between,
+    and so shares less of it than what changed: no correlation is beyond 1.
+    """
+    some = np.flatnonzero((shared != 0.0).any(axis=(0, 1)))
+    if len(some) == 0:
+        return shared
+    state, own, across = (
+        selected(values, some).transpose(2, 0, 1) for values in (covariance, error, shared)
+    )
+    scale = np.sqrt(np.maximum(np.diagonal(own, axis1=1, axis2=2), _LEAST_VARIANCE))
+    own = own / (scale[:, :, np.newaxis] * scale[:, np.newaxis])
+    own += _LEAST_VARIANCE * np.eye(own.shape[1])
+    across = across / scale[:, np.newaxis]
+    of_state = across.swapaxes(1, 2) @ np.linalg.solve(state, across)
+    root = np.linalg.inv(np.linalg.cholesky(own))
+    most = np.linalg.eigvalsh(root @ of_state @ root.swapaxes(1, 2))[:, -1]
+    result = shared.copy()
+    result[:, :, some] *= np.where(most > _ONE, 1.0 / np.sqrt(np.maximum(most, _ONE)), 1.0)
+    return result

@@ -8,19 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry import unit_vectors
+from components.fusion.recent import Recent, whole_and_alone
 from components.messages.columns import OWN_VELOCITY, POSE, TOLD
 from components.messages.contributors import mask_type
 from components.messages.detections import Detections, SensorOffer
-from components.messages.false_detections import true_entries
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.navigation.errors import navigation_errs
-from components.sensor.ladder_values import angle_apart_mrad
 from components.sensor.marks import FUSION
 from dsa_des.arrays.run_ticks import RunTicks, ranks
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Producer
-from dsa_des.block.ladder import Ladder, Quantity, Rung, Verified
+from dsa_des.block.ladder import Verified
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.record.undone import Tries, has_two
@@ -46,9 +44,12 @@ class Fusion(Component):
     inputs = {"detections": Input(Detections, "trigger", "What the sensors detected.", many=True)}
     outputs = {"fused": Output(FusedDetections, "One line of sight per target and instant.")}
     also_records = (FusedWithPose,)
+    remembers = ("_recent", "_tries")
     windowed = True
     lockstep = True
     rewindable = True
+    #: Whether detections of several sensors may become one.
+    puts_together = True
     verified = (
         Verified("where a fused row puts its target", "pymap3d, and rotations by matrices: a banked"
                  " ownship in the south", "0.05 m",
@@ -83,12 +84,12 @@ class Fusion(Component):
         self.gate_ticks = int(self.window_s() * self.context.ticks_per_s)
         #: How long before a detection another one may have come to be put together with it.
         self.keep_ticks = self.gate_ticks
-        self._recent: dict[str, Arrivals] = {}
+        self._recent = Recent()
         self._tries = Tries()
         self._navigation_errs = navigation_errs(self.context)
-        self._with_pose = self._navigation_errs or any(
-            consumer.request != WITHOUT_POSE for consumer in self.context.consumers
-        )
+        tracked = any(consumer.request != WITHOUT_POSE for consumer in self.context.consumers)
+        self._with_pose = self._navigation_errs or tracked
+        self._says_what_is_new = tracked and self.puts_together and len(offers) > 1
 
     def records(self) -> list[type[Message]]:
         """Return what is recorded: where navigation errs, with the believed pose."""
@@ -111,6 +112,8 @@ class Fusion(Component):
 
     def undone(self) -> dict[str, IntArray]:
         """Return in which runs it never put detections of two sensors together."""
+        if not self.puts_together:
+            return {}
         return self._tries.undone(
             "two sensors or more detect, and it never puts two of them together", of_two=True
         )
@@ -121,28 +124,8 @@ class Fusion(Component):
 
     def with_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
         """Return new and recent rows of every sensor, and keep what the next run may need."""
-        for name, seen in self._recent.items():
-            if ended := int(np.searchsorted(seen.message.run, wake.first_run)):
-                rows = slice(ended, None)
-                self._recent[name] = Arrivals(
-                    name, seen.instants.take(rows), seen.message.take(rows)
-                )
-        for name, new in arrivals.items():
-            old = self._recent.get(name)
-            if old is not None:
-                message = Detections.concatenate([old.message, new.message])
-                instants = RunTicks.joined([old.instants, new.instants])
-                order = instants.order()
-                if order is not None:  # those of each run together
-                    instants, message = instants.take(order), message.take(order)
-                new = Arrivals(name, instants, message)
-            self._recent[name] = new
-        latest = max(int(new.tick.max()) for new in arrivals.values())
-        together = dict(self._recent)
-        for name, seen in together.items():
-            young = np.flatnonzero(seen.tick >= latest - self.keep_ticks)
-            self._recent[name] = Arrivals(name, seen.instants.take(young), seen.message.take(young))
-        return dict(sorted(together.items()))
+        together, self._recent = self._recent.with_new(arrivals, wake.first_run, self.keep_ticks)
+        return together
 
     def combine(
         self,
@@ -167,15 +150,60 @@ class Fusion(Component):
         entries : dict of (fused,) of int
             By sensor, which entry of its message belongs to each fused detection; -1 for none.
         """
+        fused, parts = self._made(instants, row, target, arrivals, entries)
+        if len(self.sensors) > 1:
+            of_two = has_two(fused.contributors)
+            self._tries = self._tries.with_more(instants.run[row], fused.contributors, of_two)
+        if self._says_what_is_new:
+            fused.measurements = self._new(fused, parts, instants, arrivals, entries)
+        return fused
+
+    def _new(
+        self,
+        fused: FusedDetections,
+        parts: IntArray,
+        instants: RunTicks,
+        arrivals: dict[str, Arrivals],
+        entries: dict[str, IntArray],
+    ) -> FusedDetections:
+        """Return what a tracker takes of fused rows: what is new, and of one instant."""
+        made = np.concatenate([one.message.measured_ticks() for one in arrivals.values()])
+        targets = np.concatenate([one.message.target for one in arrivals.values()])
+        used = self._recent.used_of(arrivals)
+        row = fused.row_of_entries
+        whole, at, alone = whole_and_alone(row, parts, made, used)
+        used[parts[parts >= 0]] = True
+        self._recent = self._recent.with_used(arrivals, used)
+        row = np.concatenate([row[whole], at])
+        order = np.argsort(row, kind="stable")
+        target = np.concatenate([fused.target[whole], targets[alone]])[order]
+        mine, start = {}, 0
+        for name, one in arrivals.items():
+            count = len(one.message.target)
+            by_itself = np.where((alone >= start) & (alone < start + count), alone - start, -1)
+            mine[name] = np.concatenate([entries[name][whole], by_itself])[order]
+            start += count
+        return self._made(instants, row[order], target, arrivals, mine)[0]
+
+    def _made(
+        self,
+        instants: RunTicks,
+        row: IntArray,
+        target: IntArray,
+        arrivals: dict[str, Arrivals],
+        entries: dict[str, IntArray],
+    ) -> tuple[FusedDetections, IntArray]:
+        """Return fused rows, and the detections (quantities, fused) that each takes values of.
+
+        These are numbered over the arrivals, one after the other; -1 is none.
+        """
         every = _Entries(self.sensors, arrivals, entries)
         contributors: Any = np.zeros(len(row), dtype=mask_type(len(self.sensors)))
         for index, (rows, _) in every.found.items():
             contributors[rows] |= 1 << index
-        if len(self.sensors) > 1:
-            of_two = has_two(contributors)
-            self._tries = self._tries.with_more(instants.run[row], contributors, of_two)
         angle_source, of_angles = every.best(self.by_angles)
         range_source, of_range = every.best(self.by_range)
+        parts = [of_angles, of_range]
         values = {name: every.taken(attrgetter(name), of_angles) for name in _ANGLES}
         values |= {name: every.taken(attrgetter(name), of_range) for name in _RANGES}
         pose = every.taken(poses, of_angles) if self._with_pose else None
@@ -183,6 +211,7 @@ class Fusion(Component):
         moves = None
         if self.by_range_rate:
             _, of_rate = every.best(self.by_range_rate)
+            parts.append(of_rate)
             values |= {name: every.taken(attrgetter(name), of_rate) for name in _RATES}
             moves = every.taken(velocities, of_rate) if self._with_pose else None
         message = FusedWithPose if self._navigation_errs else FusedDetections
@@ -204,7 +233,8 @@ class Fusion(Component):
             **values,
         )
         fused.row_of_entries = row
-        return fused
+        every_row = np.arange(len(row))
+        return fused, np.stack([every_row if of is None else of for of in parts])
 
 
 def how_late_s(sensor: Producer) -> Fraction:
@@ -323,55 +353,3 @@ def each_alone(
         entries[name][start : start + len(mine)] = mine
         start += len(mine)
     return row, entries
-
-
-def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return how far each fused line of sight is from the true one at its instant.
-
-    Rungs fuse other rows, so they are compared with the truth and not row by row with each other.
-    """
-    fused: Any = block.run(wake)
-    if fused is None:
-        return {"direction": np.empty((0, 0)), "range": np.empty((0, 0))}
-    fused = true_entries(fused)
-    shape = (len(wake), len(fused.roster))
-    row = np.searchsorted(wake.ticks, np.repeat(fused.tick, np.diff(fused.offsets)))
-    line: FloatArray = np.full(shape, np.nan)
-    distance: FloatArray = np.full(shape, np.nan)
-    line[row, fused.target] = angle_apart_mrad(
-        unit_vectors(fused.azimuth_rad, fused.elevation_rad),
-        unit_vectors(fused.true_azimuth_rad, fused.true_elevation_rad),
-    )
-    distance[row, fused.target] = np.abs(fused.range_m - fused.true_range_m)
-    return {"direction": line, "range": distance}
-
-
-def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
-    """Return the same for the reference: sensors' grids are part of it."""
-    row, target = cells.T
-    return {name: values[row, target] for name, values in measure(block, wake, block).items()}
-
-
-def _to_the_truth(values: AnyArray, reference: AnyArray) -> FloatArray:
-    return values
-
-
-FUSION_LADDER = Ladder(
-    "association",
-    (
-        Rung("exact_instant", "same target, same instant (Fig. 4.22)", "fusion.pick_best",
-             {"coincidence_s": 0}),
-        Rung("window", "same target, at most 0.1 s apart", "fusion.pick_best",
-             {"coincidence_s": 0.1}),
-        Rung("gated", "within 0.1 s, 2 deg and 300 m, whatever the target", "fusion.gated",
-             {"time_gate_s": 0.1, "angle_gate_deg": 2.0, "range_gate_m": 300.0}),
-    ),
-    "exact_instant",
-    (
-        Quantity("range", "m", _to_the_truth),
-        Quantity("direction", "mrad", _to_the_truth),
-    ),
-    measure,
-    truth,
-    clears=("model",),
-)  # fmt: skip

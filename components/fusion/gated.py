@@ -2,12 +2,13 @@
 
 import math
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from components.fusion.fusion_block import FUSION_LADDER, Fusion, how_late_s, poses
+from components.fusion.fusion_block import Fusion, how_late_s, poses
+from components.fusion.ladder import FUSION_LADDER
 from components.geometry import (
     angle_by_haversine,
     body_angles,
@@ -129,6 +130,8 @@ def nearest_in_gate(one: Entries, anchors: IntArray, other: Entries, gates: Gate
 
 class GatedParameters(Parameters):
     """Parameters of gated fusion."""
+
+    may_change: ClassVar[tuple[str, ...]] = ("angle_gate_deg", "range_gate_m")
 
     time_gate_s: NonNegativeRational = Field(
         default=Fraction(1, 10),

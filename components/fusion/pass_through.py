@@ -23,14 +23,11 @@ class PassThrough(Fusion):
     """
 
     Parameters = Parameters
+    puts_together = False
 
     def window_s(self) -> Any:
         """Return 0: nothing waits for anything."""
         return 0
-
-    def undone(self) -> dict[str, Any]:
-        """Return nothing: to put nothing together is its work."""
-        return {}
 
     def run(self, wake: Wake) -> FusedDetections | None:
         """Pass on what came at every instant."""

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.fusion.fusion_block import FUSION_LADDER, Fusion, each_alone, latest_in_gate
+from components.fusion.fusion_block import Fusion, each_alone, latest_in_gate
+from components.fusion.ladder import FUSION_LADDER
 from components.messages.detections import SensorOffer
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections

@@ -192,6 +192,7 @@ class DaidalusGuidance(Component):
         "bands": Output(GuidanceBands, "Directions, altitudes and speeds that lose separation.")
     }
     Parameters = GuidanceParameters
+    remembers = ()
     windowed = True
     lockstep = True
     rewindable = True

@@ -40,6 +40,11 @@ _STRONGEST = 1e12
 class LaserParameters(RangeErrorParameters, SensorParameters):
     """Parameters of a scanning laser."""
 
+    may_change: ClassVar[tuple[str, ...]] = (
+        "peak_power_w", "efficiency", "noise_equivalent_power_w", "false_alarm_probability",
+        "hits_needed",
+    )  # fmt: skip
+
     errors: Literal["grid", "stated", "signal"] = Field(  # type: ignore[assignment]
         default="signal",
         description="What measured values err by: 'grid', rounding to the grid alone; 'stated', "

@@ -3,7 +3,9 @@
 Angles are in radians; azimuth is clockwise and elevation upward.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 from components.aircraft.aircraft import Roster
 from components.messages.columns import (
@@ -42,6 +44,9 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
         was, None from a fusion of sensors that measure none.
     told_by_target : dict of (entries,), or None
         As `Detections` has it, of the sensor that the range is of; NaN where nothing is reported.
+    measurements : FusedDetections or None
+        What of these is new to a tracker and of one instant, at the same rows: each detection that
+        some row takes values of, once. None where it is these themselves.
     looks : Looks or None
         Which sensors looked when, also in vain; None from a fusion that does not say.
     sensors : tuple of str
@@ -75,11 +80,21 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
     own_velocity: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     told_by_target: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     looks: Looks | None = per_row(default=None, kw_only=True)
+    measurements: "FusedDetections | None" = per_row(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.measured_tick is None:
             self.measured_tick = self.tick.take(self.row_of_entries)
+
+    def take_rows(self, rows: slice | IntArray) -> Self:
+        """Return those of some rows, as what belongs to a message's rows."""
+        return self.take(rows)
+
+    @classmethod
+    def join_rows(cls, parts: Sequence[Self]) -> Self:
+        """Return those of all parts' rows."""
+        return cls.concatenate(parts)
 
     def pose_columns(self) -> dict[str, FloatArray]:
         """Return the ownship's believed pose at each entry, by column; empty without one."""

@@ -88,6 +88,7 @@ def separations(
     return [
         RelativeFlight(source, number, step_s, count, end_s, viewer)
         for number in range(len(source.targets))
+        if number == viewer or number not in source.unseen
     ]
 
 

@@ -118,6 +118,7 @@ class Stochastic(Component):
     inputs = {"alerts": Input(AlertLevels, "trigger", "The alert level of each target.")}
     outputs = {"manoeuvres": Output(Manoeuvres, "What the ownship is told to fly.")}
     Parameters = StochasticParameters
+    remembers = ("_minds", "_next", "_stuck")
     windowed = True
     lockstep = True
     verified = (

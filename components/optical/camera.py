@@ -43,6 +43,11 @@ from dsa_des.block.effect import Effect
 class CameraParameters(GlintParameters, SensorParameters):
     """Parameters of a camera; the pixel grid follows from field of view and pixel counts."""
 
+    may_change: ClassVar[tuple[str, ...]] = (
+        "threshold", "cued_threshold", "noise_equivalent_contrast", "blur_pixels",
+        "false_alarms_per_frame",
+    )  # fmt: skip
+
     azimuth_pixels: int = Field(gt=0, description="Pixels across the field of view.")
     elevation_pixels: int = Field(gt=0, description="Pixels from its lower to its upper edge.")
     threshold: float | None = Field(

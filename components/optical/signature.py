@@ -234,6 +234,9 @@ class DynamicSignature(Effect[CellValues]):
 class MovingTargets:
     """Remembers where each target was at the last scan, and weighs how fast it moves (eq. 18)."""
 
+    #: Goes on where the sensor changes (`Component.remembers`).
+    remembers = ("_tick", "_angles")
+
     def __init__(self, weight_s: float, model: str, ticks_per_s: int) -> None:
         self.weight_s = weight_s
         self.model = model

@@ -38,6 +38,11 @@ def dwell_factor(parameters: Any) -> Any:
 class RadarParameters(ResolutionParameters):
     """Parameters of every radar: range rate, threshold and filter beyond noise, and beam."""
 
+    may_change: ClassVar[tuple[str, ...]] = (
+        "range_rate_resolution_m_s", "range_rate_error_m_s", "improvement_limit_db",
+        "rain_rejection_db",
+    )  # fmt: skip
+
     quantities: ClassVar[Mapping[str, str]] = {
         **ResolutionParameters.quantities, "range_rate": "m_s"
     }  # fmt: skip
@@ -214,6 +219,11 @@ class Calibration(Parameters):
 
 class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameters):
     """Parameters of a radar with a link budget (thesis eq. 7-8, errata 5)."""
+
+    may_change: ClassVar[tuple[str, ...]] = (
+        "power_w", "antenna_gain_db", "integration_gain_db", "noise_figure_db", "losses_db",
+        "minimum_range_m", "false_alarm_probability",
+    )  # fmt: skip
 
     as_written_with = {("calibrate", "false_alarm_probability"): "false_alarm_probability"}
     former = {

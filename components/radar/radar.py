@@ -201,6 +201,10 @@ class LaterAcquisition(Effect[CellValues]):
 class RangeBoundaryParameters(RadarParameters):
     """Parameters of a range boundary radar."""
 
+    may_change: ClassVar[tuple[str, ...]] = (
+        "minimum_range_m", "boundary_pd", "false_alarm_probability",
+    )  # fmt: skip
+
     range_km: float = Field(gt=0, description="Range inside which every target is detected, km.")
     minimum_range_m: float | None = Field(
         default=None, gt=0, description="Closer than this nothing is detected, m; none by default."

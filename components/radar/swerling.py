@@ -2,7 +2,7 @@
 
 import math
 from functools import lru_cache, partial
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -35,6 +35,8 @@ from dsa_des.time.gauss_markov import LONGEST_S
 
 class SwerlingParameters(LinkBudgetParameters):
     """Parameters of a radar with probabilistic detection."""
+
+    may_change: ClassVar[tuple[str, ...]] = ("cued_false_alarm_probability", "reference_pd")
 
     swerling: Literal[0, 1, 2, 3, 4, 5] | None = Field(
         default=None, description="Fluctuation model for all targets; by default each its own."

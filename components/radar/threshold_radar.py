@@ -55,6 +55,8 @@ from dsa_des.time.clock import nanosecond_of
 class ThresholdParameters(LinkBudgetParameters):
     """Parameters of a threshold radar."""
 
+    may_change: ClassVar[tuple[str, ...]] = ("threshold_db", "cued_threshold_db")
+
     threshold_db: float | None = Field(
         default=None,
         description="SNR that is detected, dB; by default that of the calibration, or of Pd 0.9.",

@@ -61,6 +61,9 @@ def check_speeds(ranges: tuple[AcquisitionRange, ...]) -> None:
 class Acquired:
     """Remembers which targets are acquired, and in which scan last."""
 
+    #: Goes on where the sensor changes (`Component.remembers`).
+    remembers = ("_last_scan",)
+
     def __init__(self, ranges: tuple[AcquisitionRange, ...]) -> None:
         self._ranges = ranges
         #: Of all targets of the first run, of the second, and so on; -2 where not seen.

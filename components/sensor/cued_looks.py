@@ -35,6 +35,9 @@ def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
 class ConesAhead:
     """Finds targets in the cones that a sensor holds at its scans."""
 
+    #: Goes on where the sensor changes (`Component.remembers`).
+    remembers = ("_old",)
+
     def __init__(self) -> None:
         #: Of the cones at the scans of one wake: their scan, axis, and cosine of the half angle.
         self._cones: tuple[IntArray, FloatArray, FloatArray] | None = None

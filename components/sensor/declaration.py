@@ -83,6 +83,9 @@ class Declarations:
     as a miss.
     """
 
+    #: Goes on where the sensor changes (`Component.remembers`).
+    remembers = ("_memory", "_first_tick", "_first_range_m", "names")
+
     def __init__(self, m: int, n: int) -> None:
         self.m, self.n = m, n
         self.names: tuple[str, ...] = ()
@@ -258,6 +261,9 @@ def _near(
 
 class DeclaredPlaces:
     """Remembers the last scans' detections, and when each target was first declared."""
+
+    #: Goes on where the sensor changes (`Component.remembers`).
+    remembers = ("_memory", "_first", "names")
 
     def __init__(self, block: Any) -> None:
         p = block.p

@@ -52,6 +52,8 @@ class StatedError:
 class ErrorParameters(ClockedParameters):
     """Errors of measured angles, in the sensor's own axes; radars add range and range rate."""
 
+    may_change: ClassVar[tuple[str, ...]] = ("azimuth_error_deg", "elevation_error_deg")
+
     #: Measured quantities, and the unit in which scenes give their errors.
     quantities: ClassVar[Mapping[str, str]] = {"azimuth": "deg", "elevation": "deg"}
 
@@ -145,6 +147,8 @@ class ErrorParameters(ClockedParameters):
 class RangeErrorParameters(ErrorParameters):
     """Grid and errors of a measured range."""
 
+    may_change: ClassVar[tuple[str, ...]] = ("range_resolution_m", "range_error_m")
+
     quantities: ClassVar[Mapping[str, str]] = {**ErrorParameters.quantities, "range": "m"}
 
     range_resolution_m: float = Field(
@@ -210,6 +214,11 @@ class SensorParameters(ErrorParameters):
 
     Those are the ownship's body axes unless the sensor is mounted otherwise.
     """
+
+    may_change: ClassVar[tuple[str, ...]] = (
+        "enabled", "azimuth_deg", "elevation_deg", "range_km", "azimuth_resolution_deg",
+        "elevation_resolution_deg", "misalignment_deg",
+    )  # fmt: skip
 
     enabled: bool = Field(default=True, description="Whether the sensor is switched on.")
     azimuth_deg: Annotated[tuple[float, float], AfterValidator(clockwise_azimuths)] = Field(

@@ -133,6 +133,7 @@ class Sensor(Measuring):
     windowed = True
     lockstep = True
     rewindable = True
+    remembers: ClassVar[tuple[str, ...] | None] = ()
     hooks: ClassVar[tuple[Hook[Any], ...]] = (
         CUE, AXES, APPARENT_PLACE, STRENGTH, MEASUREMENT, DECLARATION, REPORT,
     )  # fmt: skip

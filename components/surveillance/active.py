@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
@@ -68,6 +68,8 @@ _WHITE_M2 = 0.25
 
 class ActiveParameters(CooperativeParameters):
     """Parameters of active surveillance."""
+
+    may_change: ClassVar[tuple[str, ...]] = ("mode_s_in_1_s", "mode_c_in_1_s")
 
     elevation_deg: Annotated[tuple[float, float], AfterValidator(rising_elevations)] = Field(
         default=(-15.0, 20.0), description="Elevations at which answers come, deg."
@@ -301,6 +303,7 @@ class Active(CooperativeSensor):
         """Return what some cells' transponders report of true altitudes, m."""
         step_ft = self._mode_step_ft(cells, which) if self._errs else 0.0
         transponders = Transponders.of(cells, which)
+        altitude_m = self.altimeter_m(altitude_m)
         return self._altimeters.reported_ft(transponders, altitude_m, step_ft, self._errs) * FOOT_M
 
     def _climb(self, cells: Cells, detected: AnyArray, now_m: FloatArray) -> FloatArray:
@@ -344,7 +347,8 @@ class Active(CooperativeSensor):
         turned = own.yaw_rad - cells.own_attitude[0][detected]
         bearing = cells.azimuth_rad[detected] + turned + deviation * np.clip(drawn, -CUT, CUT)
         altitude = look.extras["reported_alt_m"][detected]
-        rise = sine_of_elevation(altitude - own.alt_m, distance)
+        height = self.heights_m(cells, detected, altitude)
+        rise = sine_of_elevation(height - own.alt_m, distance)
         ground = np.sqrt(np.maximum(1.0 - rise**2, 0.0))
         ned = distance * np.stack([ground * np.cos(bearing), ground * np.sin(bearing), -rise])
         azimuth, elevation, _ = in_body(own, ned)
@@ -356,7 +360,9 @@ class Active(CooperativeSensor):
                 self._step_ft(cells, detected, altitude),
                 cells.roster.equipage.mode_s[cells.craft[detected]],
             )  # fmt: skip
-        beside: dict[str, Any] = variances_in_body(own, ned, variances)
+        across, along, vertical = variances
+        vertical = vertical + self.p.pressure_deviation_m**2
+        beside: dict[str, Any] = variances_in_body(own, ned, (across, along, vertical))
         if self._errs:
             beside["told_by_target"] = self._told(cells, detected, altitude, deviation)
         return wrap_pi_unchecked(azimuth), elevation, distance, beside
@@ -373,7 +379,9 @@ class Active(CooperativeSensor):
         step_ft = self._step_ft(cells, detected, altitude_m)
         return unstated_errors(len(detected)) | {
             "own_north": own[0], "own_east": own[1], "own_down": own[2],
-            "height_deviation": np.sqrt(altimetry_ft2) * FOOT_M,
+            "height_deviation": np.hypot(
+                np.sqrt(altimetry_ft2) * FOOT_M, self.p.pressure_deviation_m
+            ),
             "rounding_deviation": step_ft * FOOT_M / math.sqrt(12.0),
             "bearing_deviation": np.hypot(deviation, attitude_rad[0]),
             "delay_deviation": np.where(mode_s, *RANGE_BIAS_M),

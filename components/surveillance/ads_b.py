@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -63,6 +63,8 @@ LONGEST_S = 5.0
 
 class AdsBParameters(CooperativeParameters):
     """Parameters of a receiver of ADS-B."""
+
+    may_change: ClassVar[tuple[str, ...]] = ("aircraft_around", "airports_around")
 
     reception: Literal["certain", "do_365", "fitted"] = Field(
         default="fitted",
@@ -203,7 +205,7 @@ class AdsB(CooperativeSensor):
     def offer(self, port: str) -> Any:
         """Say that all variances differ from report to report."""
         offer: SensorOffer = super().offer(port)
-        errs = self.p.position_errors != "none" or self.p.compact
+        errs = self.p.position_errors != "none" or self.p.compact or self.p.pressure_deviation_m
         told = told_errors(self.p.position_errors) if errs else ()
         # Of targets that may be anything some may be late.
         late = [(one.equipage.late_s > 0.0).any() for one in known_targets(self.context)]
@@ -335,8 +337,8 @@ class AdsB(CooperativeSensor):
             before = displaced_position(*position, *(-velocity * back_s))
             position = [np.where(back_s > 0.0, b, p) for b, p in zip(before, position, strict=True)]
         velocity[2] = -velocity[2]
-        lat, lon, alt = position
-        return Sent(lat, lon, alt, velocity, number, instant_ns)
+        lat, lon, height = position
+        return Sent(lat, lon, self.altimeter_m(height), velocity, number, instant_ns)
 
     def _measured(
         self,
@@ -355,7 +357,8 @@ class AdsB(CooperativeSensor):
         ])  # fmt: skip
         now_s = cells.state_ns[detected] / NANOSECONDS
         age_s = now_s - said["reported_s"]
-        position = [said[f"reported_{name}"] for name in POSITION_FIELDS]
+        lat, lon, altitude = (said[f"reported_{name}"] for name in POSITION_FIELDS)
+        position = [lat, lon, self.heights_m(cells, detected, altitude)]
         velocity = velocity_in_axes_at(position, velocity, said["reported_s"] - said["velocity_s"])
         carried = np.nan_to_num(velocity)
         ned = towards(own, *displaced_position(*position, *(carried * age_s)))
@@ -366,6 +369,7 @@ class AdsB(CooperativeSensor):
         stated = StatedByAircraft(
             cells.roster.equipage, cells.craft[detected], said,
             errs=self.p.position_errors != "none", rounds=self.p.compact,
+            pressure_deviation_m=self.p.pressure_deviation_m,
         )  # fmt: skip
         late_m = stated.late_s * np.nan_to_num(moving)
         variances = variances_in_body(own, ned, stated.position_m2(age_s), late_m)

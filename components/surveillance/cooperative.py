@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from components.aircraft.known_targets import known_targets
+from components.atmosphere.pressure_altitude import STANDARD_HPA, pressure_altitude_m
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.reach import Reach
 from components.sensor.look import Cells
@@ -17,7 +18,7 @@ from components.sensor.marks import COOPERATIVE
 from components.sensor.parameters import SensorParameters
 from components.sensor.sensor import Sensor
 from components.surveillance.reports import CooperativeReports
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Output
 from dsa_des.errors import Disagreements
 from dsa_des.record.undone import NO_COUNTS, with_cases
@@ -42,6 +43,19 @@ _MEASURED_KEYS = (
 
 class CooperativeParameters(SensorParameters):
     """Parameters of what cooperative sensors share."""
+
+    heights: Literal["reported", "by_own_altimeter"] = Field(
+        default="reported",
+        description="What reported pressure altitudes are taken for: heights as they are, or "
+        "heights once the difference between the ownship's own pressure altitude and its height "
+        "by navigation is taken off; its own altimeter has no error.",
+    )
+    pressure_deviation_m: float = Field(
+        default=0.0,
+        ge=0,
+        description="Standard deviation of what reported pressure altitudes are from heights, as "
+        "stated to trackers: those that carry errors of each aircraft estimate it, m.",
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -80,14 +94,51 @@ class CooperativeSensor(Sensor):
         reach = super().request(port)
         return replace(reach, lasts_s=4.0 * STEP_S) if self.p.enabled else reach
 
+    @cached_property
+    def _air(self) -> dict[str, float]:
+        """The atmosphere, where it is not the standard's."""
+        weather = self.context.sections.get("weather")
+        if weather is None:
+            return {}
+        air = {"qnh_hpa": weather.qnh_hpa, "offset_k": weather.temperature_offset_c}
+        return {} if air == {"qnh_hpa": STANDARD_HPA, "offset_k": 0.0} else air
+
+    def altimeter_m(self, height_m: FloatArray) -> FloatArray:
+        """Return what altimeters read at heights, but for their errors, m."""
+        if not self._air:
+            return height_m
+        altitude: FloatArray = pressure_altitude_m(height_m, **self._air)
+        return altitude
+
+    def heights_m(self, cells: Cells, which: AnyArray, altitude_m: FloatArray) -> FloatArray:
+        """Return which heights reported pressure altitudes of some cells are taken for."""
+        if self.p.heights == "reported":
+            return altitude_m
+        own_m = self.altimeter_m(cells.of_row("own_alt_m")[which])
+        return altitude_m - (own_m - cells.own_belief("alt_m")[which])
+
+    def _says_heights(self) -> list[str]:
+        """Say by how much pressure altitudes are off where they are taken for heights."""
+        if not self._air or self.p.heights != "reported":
+            return []
+        low_m, high_m = self.altimeter_m(np.array([0.0, 3000.0])) - np.array([0.0, 3000.0])
+        stated = self.p.pressure_deviation_m
+        said = f"stated with a deviation of {stated:g} m" if stated else "nobody is told"
+        return [
+            f"heights is 'reported': pressure altitudes, off by {low_m:+.0f} m at sea level and "
+            f"{high_m:+.0f} m at 3,000 m ([weather] qnh_hpa, temperature_offset_c), are compared "
+            f"with heights as if they were such, and {said}; 'by_own_altimeter' takes that off"
+        ]
+
     def warnings(self) -> list[str]:
-        """Say that no target has what it takes to be heard."""
+        """Say that no target has what it takes to be heard, and what heights are compared."""
         rosters = known_targets(self.context)
         heard = [getattr(one.equipage, name).any() for one in rosters for name in self.hears_of]
+        said = [*super().warnings(), *self._says_heights()]
         if not rosters or any(heard):
-            return super().warnings()
+            return said
         needed = " or ".join(self.hears_of)
-        return [*super().warnings(), f"no target's equipage has {needed}: it hears of nobody"]
+        return [*said, f"no target's equipage has {needed}: it hears of nobody"]
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)

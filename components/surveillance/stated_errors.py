@@ -112,7 +112,8 @@ def variances_of_replies(
 class StatedByAircraft:
     """What the categories of some aircraft, by index, state of what they reported.
 
-    `errs` and `rounds` say whether what they send has errors, and is rounded.
+    `errs` and `rounds` say whether what they send has errors, and is rounded; pressure altitudes
+    are off heights by so much beside.
     """
 
     equipage: Equipage
@@ -120,6 +121,7 @@ class StatedByAircraft:
     said: dict[str, AnyArray]
     errs: bool
     rounds: bool
+    pressure_deviation_m: float = 0.0
 
     @property
     def speed_m2_s2(self) -> FloatArray:
@@ -167,6 +169,8 @@ class StatedByAircraft:
         level = np.where(self.errs, square, _LEAST_M2)
         feet = self.said["reported_alt_m"] / FOOT_M
         high = np.where(self.errs, altimetry_variance_ft2(feet) * FOOT_M**2, _LEAST_M2)
+        if self.pressure_deviation_m:
+            high = high + self.pressure_deviation_m**2
         if self.rounds:
             level = level + _COMPACT_M2
             high = high + self._height_rounding_m2
@@ -184,7 +188,7 @@ class StatedByAircraft:
         climb = 2.0 * CLIMB_SCALE_M_S**2 if self.errs else 0.0
         climb += (64.0 * FOOT_PER_MINUTE_M_S) ** 2 / 12.0 if self.rounds else 0.0
         none = np.zeros(len(age_s))
-        tells = (self.late_s > 0.0) | self.errs | self.rounds
+        tells = (self.late_s > 0.0) | self.errs | self.rounds | (self.pressure_deviation_m > 0.0)
         carried_s, latency_s = self.carried_s(age_s), self.equipage.latency_s[self.craft]
         # Where errors are stated, filters know how targets move on the way.
         turned = np.where(tells, 0.0, _MANOEUVRE_M_S2 * (velocity_age_s + latency_s)) ** 2

@@ -129,6 +129,7 @@ class CovarianceIntersection(Component):
     inputs = {"tracks": Input(StateTracks, "trigger", "What the trackers hold.", many=True)}
     outputs = {"tracks": Output(StateTracks, "One track of each target.")}
     Parameters = IntersectionParameters
+    remembers = ("_records", "_newest", "_local", "_reported", "_tries")
     windowed = True
     lockstep = True
     rewindable = True

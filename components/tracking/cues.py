@@ -75,6 +75,7 @@ class Cues(Component):
     inputs = {"tracks": Input(StateTracks, "trigger", "What a tracker holds.")}
     outputs = {"cues": Output(CueCones, "Where to look more closely.")}
     Parameters = CueParameters
+    remembers = ("_last_tick", "_silent", "_wide")
     windowed = True
     lockstep = True
     rewindable = True

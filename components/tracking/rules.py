@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -128,6 +128,11 @@ _WHOLE_RATE_M_S = 600.0
 
 class TrackerParameters(Parameters):
     """Parameters of every tracker that estimates states."""
+
+    may_change: ClassVar[tuple[str, ...]] = (
+        "gate_probability", "start_gate_probability", "detection_probability",
+        "false_alarms_per_scan", "delete_misses", "delete_after_s", "delete_above_m",
+    )  # fmt: skip
 
     acceleration_intensity_m2_s3: float = Field(
         default=4.0, gt=0,

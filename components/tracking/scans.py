@@ -167,9 +167,12 @@ def scans_of(fused: FusedDetections) -> Scans:
     """Return the looks behind a message, and their detections, by arrival and then by instant.
 
     A fusion that passes reports on states every look, also those in vain. Of other fusions a look
-    is what was measured at one instant among the entries of a row, and a row without entries is
-    none.
+    is what was measured at one instant with the angles of one sensor, among the measurements of a
+    row. Where there are several of an instant none tells of misses: what one sensor detected may
+    have been left to another one.
     """
+    if fused.measurements is not None:
+        fused = fused.measurements
     row = fused.row_of_entries
     mask = np.asarray(fused.contributors, dtype=np.int64)
     tick = fused.measured_tick
@@ -179,7 +182,7 @@ def scans_of(fused: FusedDetections) -> Scans:
     )
     looks = fused.looks
     looked = 0
-    key = [row, tick, np.zeros_like(row)]
+    key = [row, tick, fused.angle_source]
     sensors, poses = mask, own
     if looks is not None:
         look_row = np.repeat(np.arange(len(fused)), np.diff(looks.offsets))
@@ -201,7 +204,9 @@ def scans_of(fused: FusedDetections) -> Scans:
     whole = np.zeros(count, dtype=bool)
     whole[number[order < looked]] = True
     if looks is None:
-        whole[:] = True
+        first, second = (values[begins] for values in key[:2])
+        beside = (first[1:] == first[:-1]) & (second[1:] == second[:-1])
+        whole = ~(np.append(beside, False) | np.append(False, beside))[:count]
     of_entry = np.empty(len(order), dtype=np.int64)
     of_entry[order] = number
     of_entry = of_entry[looked:]

@@ -52,6 +52,7 @@ class TrackerStub(Component):
     outputs = {"tracks": Output(Tracks, "What is held of every target.")}
     also_records = (TracksWithPose,)
     Parameters = StubParameters
+    remembers = ("_held", "_tries", "_nothing")
     windowed = True
     lockstep = True
     rewindable = True

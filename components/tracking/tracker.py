@@ -70,6 +70,7 @@ class Tracker(Component):
     inputs = {"fused": Input(FusedDetections, "trigger", "What was measured.")}
     outputs = {"tracks": Output(StateTracks, "Estimated tracks.")}
     Parameters = TrackerParameters
+    remembers = ("_store", "_records", "_past", "_ahead", "_count", "_early", "_tries", "_sensors")
     windowed = True
     lockstep = True
     rewindable = True
@@ -124,6 +125,23 @@ class Tracker(Component):
         self._remembers = may_come_late(offers, self.context.producers)
         self._count, self._early = LookCount(), 0
         self._tries = Tries()
+
+    def take_over(self, before: Any) -> None:
+        """Go on with the tracks there are, by rules of its own."""
+        super().take_over(before)
+        kept, now = ([m.size for m in one._estimator.models] for one in (before, self))
+        if kept != now:
+            raise ValueError(
+                "its sensors' errors last otherwise from now on, which its tracks have no states "
+                "for: change what is new at every look"
+            )
+        if before.rules is not None:
+            self.rules = self._rules_for(self._sensors)
+        self._remembers = self._remembers or before._remembers
+
+    def _rules_for(self, sensors: tuple[str, ...]) -> TrackerRules:
+        offers, per_s = sensor_offers(self.context.producers), self.context.ticks_per_s
+        return TrackerRules.of(self.p, self._estimator, offers, sensors, per_s)
 
     def acts_every_s(self) -> Fraction | None:
         """Return how often tracks are looked through that nothing comes of, s."""
@@ -216,10 +234,7 @@ class Tracker(Component):
             return [], _NO_ROWS
         if self.rules is None or fused.sensors != self._sensors:
             self._sensors = fused.sensors
-            self.rules = TrackerRules.of(
-                self.p, self._estimator, sensor_offers(self.context.producers), fused.sensors,
-                self.context.ticks_per_s,
-            )  # fmt: skip
+            self.rules = self._rules_for(fused.sensors)
             self._store = self._no_tracks(len(fused.sensors))
         came = scans_of(fused)
         self._early += int((came.tick > busy.ticks[came.row]).sum())

@@ -51,6 +51,10 @@ _ARCMIN_RAD = math.radians(1.0 / 60.0)
 class LookoutParameters(SensorParameters):
     """Parameters of one or two observers; the defaults are the left pilot of Andrews's model."""
 
+    may_change: ClassVar[tuple[str, ...]] = (
+        "left_looking", "right_looking", "beta_per_sr_s", "smallest_arcmin",
+    )  # fmt: skip
+
     quantities: ClassVar[Mapping[str, str]] = {**ErrorParameters.quantities, "range": "m"}
 
     azimuth_deg: Annotated[tuple[float, float], AfterValidator(clockwise_azimuths)] = Field(
@@ -206,6 +210,7 @@ class Lookout(Sensor):
 
     mark = EYES
     Parameters = LookoutParameters
+    remembers = ("_first_seen",)
     hooks = (DARKNESS,)
     effects: ClassVar[tuple[Effect, ...]] = (Night(),)
     ladders = (BETWEEN_SCANS,)

@@ -104,6 +104,10 @@ class Component:
     #: own code and of the effects that it lists, and of the classes of its package that derive
     #: from it: one of another package that does not say it again gets an instance for each run.
     lockstep: ClassVar[bool] = False
+    #: Attributes that hold what it remembers from one wake to the next; () for none. Where its
+    #: parameters, or what its neighbours say, change while a run lasts, another instance goes on
+    #: with these. None where the block does not say: it goes on as it is.
+    remembers: ClassVar[tuple[str, ...] | None] = None
     #: How many targets a row counts as at least, where windows of a single run are sized: what the
     #: block makes of each row is there until its window ends.
     least_width: ClassVar[int] = 4
@@ -131,8 +135,9 @@ class Component:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        if "lockstep" not in vars(cls) and not _says_so(cls):
-            cls.lockstep = False
+        for said, unsaid in (("lockstep", False), ("remembers", None)):
+            if said not in vars(cls) and not _speaks_for(cls, said):
+                setattr(cls, said, unsaid)
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
         self.name = name
@@ -280,6 +285,15 @@ class Component:
         (one,) = built
         return one
 
+    def take_over(self, before: "Component") -> None:
+        """Go on from what this block remembers under the parameters that it had `before`."""
+        for name in type(self).remembers or ():
+            setattr(self, name, getattr(before, name))
+        for name, built in self.context.effects.items():
+            old = before.context.effects.get(name)
+            for attribute in getattr(built, "remembers", ()) if old is not None else ():
+                setattr(built, attribute, getattr(old, attribute))
+
     def serves_replicas(self) -> bool:
         """Return whether this block may serve replicas in lock step."""
         return type(self).lockstep
@@ -307,11 +321,10 @@ class Component:
         return f"{cls.__module__}:{cls.__qualname__}"
 
 
-def _says_so(cls: type[Component]) -> bool:
-    """Whether the base that last said `Component.lockstep` speaks for a class of its package."""
-    base = next(base for base in cls.__mro__ if "lockstep" in vars(base))
-    same = base.__module__.partition(".")[0] == cls.__module__.partition(".")[0]
-    return same and bool(vars(base)["lockstep"])
+def _speaks_for(cls: type[Component], said: str) -> bool:
+    """Whether the base that last said something of its code is of the same package."""
+    base = next(base for base in cls.__mro__ if said in vars(base))
+    return base.__module__.partition(".")[0] == cls.__module__.partition(".")[0]
 
 
 @dataclass(eq=False)

@@ -142,6 +142,9 @@ class Parameters(BaseModel):
     #: Keys that there were, each with what says the same now.
     former: ClassVar[Mapping[str, str]] = {}
 
+    #: Keys that may change while a run lasts (``[[changes]]``), beside those of base classes.
+    may_change: ClassVar[tuple[str, ...]] = ()
+
     @field_validator("*", mode="after")
     @classmethod
     def _computable(cls, value: Any, info: ValidationInfo) -> Any:
@@ -165,6 +168,10 @@ class Parameters(BaseModel):
 
 class ClockedParameters(Parameters):
     """Parameters of a block with a scan clock of its own."""
+
+    may_change: ClassVar[tuple[str, ...]] = (
+        "scan_rate_hz", "offset_s", "rate_error_ppm", "jitter_s",
+    )  # fmt: skip
 
     scan_rate_hz: PositiveRational = Field(description="Scans per second; number or '30000/1001'.")
     offset_s: NonNegativeRational = Field(

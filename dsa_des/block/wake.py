@@ -106,13 +106,21 @@ class Wake:
         if self._idle is None or not self._idle.any():
             return self
         rows = np.flatnonzero(~self._idle)
-        if len(rows) == 0:
-            return None
+        return self.part(rows, self._arrived) if len(rows) else None
+
+    def part(self, rows: IntArray, arrived: Mapping[str, list[Arrivals]]) -> "Wake":
+        """Return some of the rows as a wake of their own, with some of what arrived."""
         held = {port: (message, of[rows]) for port, (message, of) in self._held.items()}
-        instants = self.instants.part(rows)
+
+        def demand() -> dict[str, IntArray]:
+            return {
+                block: np.flatnonzero(np.isin(rows, asked)) for block, asked in self.demand.items()
+            }
+
         return Wake(
-            instants, self.scans[rows], self.ticks_per_s, held, self._arrived,
+            self.instants.part(rows), self.scans[rows], self.ticks_per_s, held, arrived, demand,
             first_run=self.first_run, clock=self._clock,
+            idle=None if self._idle is None else self._idle[rows],
         )  # fmt: skip
 
     @cached_property

@@ -13,7 +13,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from dsa_des.block.registry import section_models
-from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
+from dsa_des.scene.block_table import BlockOptions, Outage, ProcessorParameters
+from dsa_des.scene.changes import may_change
 
 _UNITS = {
     "hz": "Hz", "s": "s", "ms": "ms", "m": "m", "km": "km", "deg": "deg", "rad": "rad",
@@ -27,7 +28,7 @@ def parameter_rows(
     model: type[BaseModel], prefix: str = ""
 ) -> list[tuple[str, str, str, str, str]]:
     """Return name, type with bounds, unit, default and meaning of every parameter."""
-    rows = []
+    rows, changing = [], may_change(model)
     for name, info in model.model_fields.items():
         nested = _nested(info.annotation)
         kind = "table" if nested else _type_name(info.annotation)
@@ -40,10 +41,10 @@ def parameter_rows(
         # A field whose name ends like a unit says that it has none.
         said = info.json_schema_extra if isinstance(info.json_schema_extra, dict) else {}
         unit = str(said.get("unit", _unit(name, kind)))
-        rows.append(
-            (f"  {prefix}{name}", kind + (f" {bounds}" if bounds else ""), unit,
-             default, info.description or "")
-        )  # fmt: skip
+        meaning = info.description or ""
+        meaning += " May change while a run lasts." if name in changing else ""
+        kind += f" {bounds}" if bounds else ""
+        rows.append((f"  {prefix}{name}", kind, unit, default, meaning))
         for inner in nested:
             rows += parameter_rows(inner, f"{prefix}{name}.")
     return rows
@@ -131,6 +132,14 @@ SCENE: tuple[Row, ...] = (
     ("blocks", "tables", "", "required", "One table for each block, by its name."),
     ("wires", "list", "", "[]", "Who sends to whom: texts or tables."),
     ("processors", "tables", "", "-", "Shared processors, by name."),
+    ("outages", "list of tables", "", "[]", "Blocks that fail at random, and are repaired."),
+    (
+        "changes",
+        "list of tables",
+        "",
+        "[]",
+        "What is otherwise from an instant on, or for a while.",
+    ),
 )
 ANYWHERE: tuple[Row, ...] = (
     ("extends", "text or list of texts", "", "-",
@@ -154,6 +163,16 @@ WIRES: tuple[Row, ...] = (
 )  # fmt: skip
 
 
+CHANGES: tuple[Row, ...] = (
+    ("at_s", "number or fraction >= 0", "s", "-", "From when on, for good: until the next change "
+     "of the same key. Either this or the next two."),
+    ("from_s", "number or fraction >= 0", "s", "-", "From when on, for a while."),
+    ("to_s", "number or fraction >= 0", "s", "-", "First instant at which all is as before again."),
+    ("set", "table", "", "required", "Dotted keys and their values then. Keys that may change are "
+     "marked so."),
+)  # fmt: skip
+
+
 def scene_tables() -> Mapping[str, tuple[str, Callable[[], list[Row]]]]:
     """Return name → (what it is, its rows on demand) of all that a scene may hold."""
     known: dict[str, tuple[str, Callable[[], list[Row]]]] = {
@@ -164,6 +183,8 @@ def scene_tables() -> Mapping[str, tuple[str, Callable[[], list[Row]]]]:
             lambda: _rows_of(BlockOptions),
         ),
         "wires": ("Keys of an item of `wires`.", lambda: list(WIRES)),
+        "outages": ("Keys of an item of `outages`.", lambda: _rows_of(Outage)),
+        "changes": ("Keys of an item of `changes`.", lambda: list(CHANGES)),
         "processors": ("Keys of [processors.NAME].", lambda: _rows_of(ProcessorParameters)),
     }
     for name, model in section_models().items():

@@ -2,7 +2,7 @@
 
 import gc
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -165,6 +165,10 @@ def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
             f"  {node.name}: {float(spec.rate_hz):g} Hz from {float(spec.offset_s):g} s, "
             f"a scan every {float(node.clock.period):,.10g} ticks"
         )
+    for change in loaded.changes:
+        say(f"  {change.sentence()}")
+    for outage in loaded.outages:
+        say(f"  {outage.sentence()}")
 
 
 _WIDE = 300
@@ -179,14 +183,7 @@ def explain_scene(
     shares = measured_shares(loaded, simulate_everything) if measure else None
     console = terminal.console(_WIDE)  # no terminal: every sentence on one line
     # What the scene calls for stands first: most of what there is, it does not call for.
-    planned = sorted([*simulation.plan, *simulation.timing_plan], key=lambda item: not item.built)
-    rows = []
-    for item in planned:
-        share = None if shares is None else shares.get((item.block, item.effect.name))
-        timed = "" if share is None else f"{share:.1%}"
-        rows.append((shortened(item.block), _bound(item), timed, item.sentence()))
-    for name, component in simulation.components.items():
-        rows += [(shortened(name), "", "", sentence) for sentence in component.left_out()]
+    planned, rows = _planned(simulation, 0, shares)
     if not rows:
         console.print("No block of this scene declares effects.")
         return
@@ -194,9 +191,32 @@ def explain_scene(
     acting = sum(item.built for item in planned)
     title = f"{shortened(loaded.title)}: {acting} effects simulated, {len(planned) - acting} not"
     print_table(console, title, headings, rows, group=0)
+    for number, stretch in enumerate(loaded.stretches, start=1):
+        known, rows = rows, _planned(simulation, number, shares)[1]
+        title = f"From {float(stretch.from_s):g} s on, otherwise than before"
+        if new := [row for row in rows if row not in known]:
+            print_table(console, title, headings, new, group=0)
+        else:
+            console.print(f"{title}: nothing")
     if outside := [item for item in planned if not item.effect.neutral and not item.built]:
         console.print()
         console.print(_outside_the_proof(outside))
+
+
+def _planned(
+    simulation: Simulation, stretch: int, shares: Mapping[tuple[str, str], float] | None
+) -> tuple[list[Planned], list[tuple[str, str, str, str]]]:
+    """Return what became of the effects in a stretch of the scene, also as rows of a table."""
+    planned = [*simulation.plans[stretch], *simulation.timing_plan_of(stretch)]
+    planned.sort(key=lambda item: not item.built)
+    rows = []
+    for item in planned:
+        share = None if shares is None else shares.get((item.block, item.effect.name))
+        timed = "" if share is None else f"{share:.1%}"
+        rows.append((shortened(item.block), _bound(item), timed, item.sentence()))
+    for name, component in simulation.stretches[stretch].items():
+        rows += [(shortened(name), "", "", sentence) for sentence in component.left_out()]
+    return planned, rows
 
 
 def _outside_the_proof(items: list[Planned]) -> Any:

@@ -42,6 +42,10 @@ class Variants:
         scene_file = read_scene_file(path)
         changes, scene_file.problems = read_changes(sets, swaps, seed, duration_s)
         self.dropped = apply_changes(scene_file, changes)
+        for key in ("changes", "outages"):
+            if key in scene_file.data:
+                message = f'costs are of a scene that stays as it is: remove = ["{key}"]'
+                scene_file.report((key,), message)
         stated = check_scene(scene_file.copy())
         #: What ``[accuracy]`` of the scene allows.
         self.tolerance: Mapping[str, float] = stated.tolerance

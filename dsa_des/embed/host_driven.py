@@ -336,6 +336,10 @@ def _refusals(scene: Scene, source: str) -> list[Problem]:
     looped = in_cycles(scene.graph)
     if looped:
         refusals.append(("wires", f"feedback between {', '.join(sorted(looped))}"))
+    if scene.changes:
+        refusals.append(("changes", "something that changes while it runs"))
+    if scene.outages:
+        refusals.append(("outages", "blocks that fail at random"))
     for wire in scene.wires:
         if wire.delayed or wire.jitter_s or wire.drop_probability:
             refusals.append(("wires", f"{wire} has a delay, jitter, latency or loss"))

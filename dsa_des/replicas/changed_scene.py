@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.block_table import Block, BlockOptions
+from dsa_des.scene.changes import Stretch, ticks_of_all
 from dsa_des.scene.checks import check_times, read_clocks
 from dsa_des.scene.keys import no_item, place_of, unquoted
 from dsa_des.scene.parameter_errors import explain
@@ -56,7 +57,7 @@ def scene_of(scene: Scene, replica: Replica) -> Scene:
         clocks = read_clocks(file, blocks)
         ticks_per_s = check_times(file, blocks, clocks, wires, duration)
         file.refuse()
-    return replace(
+    made = replace(
         scene,
         seed=replica.seed,
         blocks=blocks,
@@ -64,7 +65,24 @@ def scene_of(scene: Scene, replica: Replica) -> Scene:
         wires=wires,
         duration_s=duration,
         ticks_per_s=ticks_per_s,
+        stretches=[_stretch_of(stretch, replica) for stretch in scene.stretches],
     )
+    if made.stretches:
+        file = SceneFile(scene.path, {})
+        made.ticks_per_s = ticks_of_all(file, made)
+        file.refuse()
+    return made
+
+
+def _stretch_of(stretch: Stretch, replica: Replica) -> Stretch:
+    """Return a stretch as a replica has it: what the scene changes then, the replica does not."""
+    fixed = [key_path(key) for key in stretch.keys]
+    mine = {
+        key: value
+        for key, value in replica.changes.items()
+        if not any(key_path(key)[: len(path)] == path for path in fixed)
+    }
+    return replace(stretch, scene=scene_of(stretch.scene, Replica(replica.seed, mine)))
 
 
 _Changed = tuple[dict[str, Block], dict[str, Any], Fraction | None]

@@ -129,7 +129,7 @@ def drawn_columns(scene: Scene, replicas: Sequence[Replica]) -> ReplicaScenes | 
 
     Then every one has to be made and checked by itself (`scene_of`), which also says what is wrong.
     """
-    if len(replicas) < _FEWEST:
+    if len(replicas) < _FEWEST or scene.stretches:
         return None
     keys = replicas[0].changes.keys()
     if any(replica.changes.keys() != keys for replica in replicas):

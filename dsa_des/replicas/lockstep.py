@@ -25,7 +25,9 @@ from dsa_des.running.loops import opened_loops
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Rewinder, Windows
+from dsa_des.scene.block_table import Block
 from dsa_des.scene.scene import Scene
+from dsa_des.stretches.stretched_block import StretchedBlock
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
 
@@ -134,7 +136,10 @@ class Replicas(Timeline):
                 raise
             return None  # what is wrong with one of them shows when that one is made
 
-    def _parameters_of(self, name: str) -> list[Any]:
+    def _parameters_of(self, name: str, stretch: int | None = None) -> list[Any]:
+        if stretch is not None and self.scene.stretches:
+            scenes = [scene.stretches[stretch].scene for scene in self._scenes]
+            return [scene.blocks[name].parameters for scene in scenes]
         if isinstance(self._scenes, ReplicaScenes):
             return self._scenes.parameters_of(name)
         return [scene.blocks[name].parameters for scene in self._scenes]
@@ -208,11 +213,20 @@ class Replicas(Timeline):
                 component.context.duration_s = ended
             self._report(number, component.report())
 
-    def clock_specs(self, name: str, component: Component) -> list[ClockSpec]:
+    def stretched(self, instances: Sequence[Component]) -> StretchedBlock | None:
+        """Return the instances of a block that changes, each of which serves all replicas."""
+        stretched, name = super().stretched(instances), instances[0].name
+        if stretched is not None and not all(self._shared(name, one) for one in instances):
+            raise NotInLockStep(f"block {name} changes while it runs, and cannot be shared")
+        return stretched
+
+    def clock_specs(
+        self, name: str, component: Component, stretch: int | None = None
+    ) -> list[ClockSpec]:
         """Return what each replica says of a block's clock."""
         every: list[Any] = []
         known: dict[int, Any] = {}  # by the identity of parameters, which many replicas share
-        for parameters in self._parameters_of(name):
+        for parameters in self._parameters_of(name, stretch):
             if id(parameters) not in known:
                 known[id(parameters)] = component.clock_of(parameters)
             every.append(known[id(parameters)])
@@ -283,7 +297,34 @@ def _check_alike(scenes: Sequence[Scene]) -> None:
             and scene.duration_s == first.duration_s
             and scene.ticks_per_s == first.ticks_per_s
             and scene.classes == first.classes
+            and scene.outages == first.outages
             and all(scene.sections[name] == model for name, model in first.sections.items())
         )
         if not same:
             raise NotInLockStep("the replicas differ in wires, types, duration, ticks or sections")
+        if not _change_alike(scene, first):
+            raise NotInLockStep("the replicas differ in what changes while they run")
+
+
+def _change_alike(scene: Scene, first: Scene) -> bool:
+    """Return whether the same blocks change at the same instants, and are then the same."""
+    if [one.from_s for one in scene.stretches] != [one.from_s for one in first.stretches]:
+        return False
+    pairs = [(a.scene, b.scene) for a, b in zip(scene.stretches, first.stretches, strict=True)]
+    return all(
+        one.wires == other.wires
+        and one.sections == other.sections
+        and all(
+            _but_clock(one.blocks[name]) == _but_clock(block)
+            for name, block in other.blocks.items()
+            if block.parameters != first.blocks[name].parameters
+        )
+        for one, other in pairs
+    )
+
+
+def _but_clock(block: Block) -> dict[str, Any]:
+    """Return a block's parameters without what only the engine reads of its clock."""
+    clocked = isinstance(block.parameters, ClockedParameters)
+    values = dict(block.parameters)
+    return {n: v for n, v in values.items() if not clocked or n not in _OF_THE_CLOCK}

@@ -81,6 +81,8 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
         console.print(shortened(sentence, _LONGEST), markup=False, soft_wrap=True)
     if tables.rows.failed:
         console.print(f"{tables.rows.failed} runs failed; `error` and `command` of parts/ say why")
+        first = str(tables.rows.stored.failed[0]["error"])
+        console.print(shortened(f"the first: {first}", _LONGEST), markup=False, soft_wrap=True)
     if tables.rows.crashed:
         console.print(
             f"{tables.rows.crashed} of them crashed: the process that ran them died each time; "
@@ -165,7 +167,7 @@ def gain_text(line: Line) -> str:
     assert ratio is not None
     at = "".join(f"{short(value)}: " for value in line.at)
     said = f"{at}{line.result.name}: {ratio.flown:,} of {ratio.encounters:,} runs were flown"
-    if not ratio.gain > 0.0:
+    if ratio.reason or not ratio.gain > 0.0:
         return said
     if ratio.gain <= 1.0:
         return f"{said}; as wide an interval costs no more with all of them: nothing is gained"

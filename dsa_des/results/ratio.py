@@ -30,7 +30,8 @@ difference estimator: C.-E. Särndal, B. Swensson & J. Wretman, "Model assisted 
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -170,11 +171,11 @@ def paired_ratio(
         return PairedRatio(
             nan, nan, nan, nan, (nan, nan), nan, sizes, *counts, *share, method, why,
             clusters=len(terms[0]),
+            flown=_many_flown(n, s),
         )  # fmt: skip
     above = math.fsum(y)
-    added = math.fsum(
-        w * _expanded(np.maximum(m - n, 0.0), s, None if d is None else d * (n == 0.0))
-    )
+    induced = _expanded(np.maximum(m - n, 0.0), s, None if d is None else d * (n == 0.0))
+    added = max(0.0, math.fsum(w * induced))
     left, ratio = above - added, above / below
     each, x, y = terms
     residual = y - ratio * x
@@ -212,14 +213,51 @@ def _gain(
     predicted: FloatArray | None, ratio: float,
 ) -> tuple[int, float]:  # fmt: skip
     """Return how many were flown, and by how much that is cheaper than all at the same width."""
+    flown = _many_flown(nominal, stands_for)
     if stands_for is None:
-        return len(nominal), 1.0
-    flown = int(np.count_nonzero(stands_for))
+        return flown, 1.0
     plain = math.fsum(stands_for * (weight * (mitigated - ratio * nominal)) ** 2)
     expanded = _expanded(mitigated, stands_for, predicted)
     sampled = math.fsum((weight * (expanded - ratio * nominal)) ** 2)
     cost = flown / len(nominal) + FORESEEN_COST
     return flown, plain / (sampled * cost) if sampled > 0.0 else math.nan
+
+
+def _many_flown(nominal: FloatArray, stands_for: FloatArray | None) -> int:
+    return len(nominal) if stands_for is None else int(np.count_nonzero(stands_for))
+
+
+def sampled_share(
+    whole: FloatArray,
+    part: FloatArray,
+    weight: FloatArray,
+    stands_for: FloatArray,
+    *,
+    predicted: FloatArray | None,
+    **options: Any,
+) -> PairedRatio:
+    """Return which share of some events is of a kind that only the encounters flown know.
+
+    The part by all events, as `paired_ratio` has it; or by those that the flown ones stand for (J.
+    Hájek's ratio), which is surer where the share is large, and never above 1: the surer of both.
+    """
+    one = paired_ratio(
+        whole, part, weight, stands_for=stands_for, predicted=predicted, **options
+    )  # fmt: skip
+    flown = np.flatnonzero(stands_for)
+    cluster = options.pop("cluster", None)
+    other = paired_ratio(
+        whole[flown], part[flown], (weight * stands_for)[flown],
+        cluster=None if cluster is None else cluster[flown], **options,
+    )  # fmt: skip
+    if not other.reason and (other.standard_error < one.standard_error or one.ratio > 1.0):
+        sure = other.standard_error > 0.0
+        gain = (one.standard_error / other.standard_error) ** 2 if sure else math.nan
+        names = "ratio", "induced", "unresolved", "standard_error", "interval", "few"
+        new = {name: getattr(other, name) for name in names}
+        one = replace(one, **new, gain=one.gain * gain)
+    low, high = one.interval
+    return replace(one, interval=(low, min(high, 1.0)))
 
 
 def ratios_by_class(

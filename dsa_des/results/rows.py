@@ -24,7 +24,7 @@ from dsa_des.results.differences import (
     ratio_difference,
 )
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.ratio import PairedRatio, paired_ratio, taken_over
+from dsa_des.results.ratio import PairedRatio, paired_ratio, sampled_share, taken_over
 from dsa_des.results.record import (
     CRASHED,
     EVENT,
@@ -287,13 +287,11 @@ class Rows:
         assert self.stands_for is not None
         values, stands_for = self.column(result.name)[rows].astype(float), self.stands_for[rows]
         known = ~np.isnan(values) | (stands_for == 0.0)
-        ratio = paired_ratio(
-            np.ones(int(known.sum())), values[known], cluster=self.units[rows][known],
-            stands_for=stands_for[known], predicted=self.predicted(result.name, rows[known]),
-            confidence=confidence,
+        ratio = sampled_share(
+            np.ones(int(known.sum())), values[known], np.ones(int(known.sum())),
+            stands_for[known], cluster=self.units[rows][known],
+            predicted=self.predicted(result.name, rows[known]), confidence=confidence,
         )  # fmt: skip
-        low, high = ratio.interval
-        ratio = replace(ratio, interval=(low, min(high, 1.0)))
         return estimate_of(ratio), int((~known).sum())
 
     def ratio(
@@ -307,11 +305,15 @@ class Rows:
         below, above, weight, cluster, stands_for, predicted = terms
         method = "bootstrap" if method == "bootstrap" else "gamma"
         together = cluster if len(np.unique(cluster)) < len(used) else None
-        ratio = paired_ratio(
-            below, above, weight, cluster=together, stands_for=stands_for, predicted=predicted,
-            confidence=confidence, method=method, resamples=_RESAMPLES,
-        )  # fmt: skip
-        if result.ratio is not None and result.ratio.share:
+        options: dict[str, Any] = {
+            "cluster": together, "predicted": predicted, "confidence": confidence,
+            "method": method, "resamples": _RESAMPLES,
+        }  # fmt: skip
+        is_share = result.ratio is not None and result.ratio.share
+        if is_share and stands_for is not None:
+            return sampled_share(below, above, weight, stands_for, **options), missing
+        ratio = paired_ratio(below, above, weight, stands_for=stands_for, **options)
+        if is_share:
             low, high = ratio.interval
             ratio = replace(ratio, interval=(low, min(high, 1.0)))
         return ratio, missing

@@ -1,6 +1,6 @@
 """The blocks of a scene, built and set up: with their neighbours known and their effects built."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any
@@ -19,7 +19,12 @@ from dsa_des.time.clock import MAX_TICK
 
 
 class Assembly:
-    """The blocks of a scene, ready to run.
+    """The blocks of a scene, ready to run, in each stretch of time.
+
+    Where something changes while the scene runs, `stretches` are the blocks of each stretch. A
+    block goes on as it is unless its own parameters, the scene's sections or what its neighbours
+    offer are others: then another instance of it is set up, as long as it says what it remembers.
+    What is asked of a block is what is asked in any stretch.
 
     A `SceneError` says why the scene has no length, or which block cannot be built or set up.
     """
@@ -33,43 +38,72 @@ class Assembly:
         wrap_effect: WrapEffect | None,
         rewinds: bool,
     ) -> None:
-        self._scene = scene
+        self._scene, self._timeline, self._recorder = scene, timeline, recorder
         self._everything = simulate_everything
         self._rewinds = rewinds
+        self._scenes = [scene, *(stretch.scene for stretch in scene.stretches)]
         self._place = telling_order(scene.graph, scene.classes)
-        self.components = self._build(timeline, recorder)
+        #: The blocks of each stretch, the first one that of the start.
+        self.stretches: list[dict[str, Component]] = [{} for _ in self._scenes]
+        for number in range(len(self._scenes)):
+            self._build(number)
+        self.components = self.stretches[0]
         self.duration_s = self._duration()
+        self._refuse_late_changes()
         #: Blocks that move what carries others, and the names of that.
         self._sources = {n: names for n, c in self.components.items() if (names := c.platforms())}
         self._put_on_platforms()
-        self._offer_down_the_chain()
-        self.plan = self._plan_effects(wrap_effect)
+        #: Blocks that go on by what their neighbours said at first, and the stretch from which on
+        #: these say otherwise: they do not say what they remember.
+        self.unheard: dict[str, int] = {}
+        for number in range(len(self._scenes)):
+            self._offer_down_the_chain(number)
+        #: What became of the effects of each stretch.
+        self.plans = self._plan_effects(wrap_effect)
         self._set_up()
 
-    def _build(self, timeline: Timeline, recorder: Recorder | None) -> dict[str, Component]:
-        runs = timeline.count if recorder is None else max(timeline.count, recorder.runs)
-        tables = () if recorder is None else recorder.wanted_tables
-        components: dict[str, Component] = {}
+    def _build(self, number: int) -> None:
+        components = self.stretches[number]
+        before = self.stretches[number - 1] if number else {}
         problems: list[Problem] = []
-        for name, block in self._scene.blocks.items():
-            context = Context(
-                timeline.streams,
-                self._scene.ticks_per_s,
-                sections=self._scene.sections,
-                simulate_everything=self._everything,
-                recorded_runs=runs,
-                recorded_tables=tables,
-                rewinds=self._rewinds,
-            )
-            with self._preparing(name, problems):
-                components[name] = block.cls(name, timeline.parameters(name), context)
+        for name in self._scenes[number].blocks:
+            if not number or self._differs(name, number):
+                with self._preparing(name, problems):
+                    components[name] = self._made(name, number)
+            else:
+                components[name] = before[name]
         _raise_any(problems)
-        return components
+
+    def _differs(self, name: str, number: int) -> bool:
+        """Return whether a block's parameters, or sections, are others than in the last stretch."""
+        scene, before = self._scenes[number], self._scenes[number - 1]
+        block, old = scene.blocks[name], before.blocks[name]
+        if block.parameters is not old.parameters and block.parameters != old.parameters:
+            if block.cls is not old.cls or block.cls.remembers is None:
+                message = f"cannot change while a run lasts: {block.cls.path()} is made anew by it"
+                raise SceneError([self._scene.problem(f"blocks.{name}", message)])
+            return True
+        return block.cls.remembers is not None and scene.sections != before.sections
+
+    def _made(self, name: str, number: int) -> Component:
+        scene, timeline, recorder = self._scenes[number], self._timeline, self._recorder
+        context = Context(
+            timeline.streams,
+            self._scene.ticks_per_s,
+            sections=scene.sections,
+            simulate_everything=self._everything,
+            recorded_runs=max(timeline.count, 0 if recorder is None else recorder.runs),
+            recorded_tables=() if recorder is None else recorder.wanted_tables,
+            rewinds=self._rewinds,
+        )
+        block = scene.blocks[name]
+        parameters = block.parameters if number else timeline.parameters(name)
+        return block.cls(name, parameters, context)
 
     def _duration(self) -> Fraction:
         if self._scene.duration_s is not None:
             return self._scene.duration_s
-        lengths = [self._asked(name, "natural_duration_s") for name in self.components]
+        lengths = [self._asked(one, "natural_duration_s") for one in self.components.values()]
         known = [length for length in lengths if length is not None]
         if not known:
             message = "is required: no block of this scene has a length of its own"
@@ -80,70 +114,116 @@ class Assembly:
             raise SceneError([self._scene.problem("duration_s", message)])
         return longest
 
-    def _put_on_platforms(self) -> None:
-        """Tell every block what carries it."""
-        for name, platform in platforms_of(self._scene, self._sources).items():
-            self.components[name].context.platform = platform
+    def _refuse_late_changes(self) -> None:
+        for stretch in self._scene.stretches if self._scene.duration_s is None else ():
+            if stretch.from_s > self.duration_s:
+                ends_s = f"the run's end, {float(self.duration_s):g} s"
+                message = f"something changes at {float(stretch.from_s):g} s, beyond {ends_s}"
+                raise SceneError([self._scene.problem("changes", message)])
 
-    def _offer_down_the_chain(self) -> None:
+    def _put_on_platforms(self) -> None:
+        """Tell every block what carries it, which no change alters."""
+        self._platforms = platforms_of(self._scene, self._sources)
+        for components in self.stretches:
+            for name, platform in self._platforms.items():
+                components[name].context.platform = platform
+
+    def _offer_down_the_chain(self, number: int) -> None:
         """Tell every block what its producers offer, sources first: a block may pass it on.
 
         It comes before effects are planned, so that a verdict may rest on it.
         """
-        for name in sorted(self.components, key=lambda name: (self._place[name], name)):
-            self.components[name].context.producers = [
+        components = self.stretches[number]
+        for name in sorted(components, key=lambda name: (self._place[name], name)):
+            producers = [
                 Producer(
                     wire.source,
                     wire.input,
-                    self._offer(wire),
+                    self._offer(wire, components),
                     wire.total_delay_s + Fraction(wire.jitter_s),
                     Fraction(wire.jitter_s),
                     wire.queued or wire.delay_scans > 0,
-                    self.components[wire.source].context.platform,
+                    components[wire.source].context.platform,
                 )
-                for wire in self._scene.wires
+                for wire in self._scenes[number].wires
                 if wire.target == name
             ]
+            if number and components[name] is self.stretches[number - 1][name]:
+                told_by = components[name]
+                if _same(producers, told_by.context.producers):
+                    continue
+                if type(components[name]).remembers is None:
+                    self.unheard.setdefault(name, number)
+                    continue
+                problems: list[Problem] = []
+                with self._preparing(name, problems):
+                    components[name] = self._made(name, number)
+                _raise_any(problems)
+                components[name].context.platform = told_by.context.platform
+            components[name].context.producers = producers
 
-    def _offer(self, wire: Wire) -> Any:
+    def _offer(self, wire: Wire, components: Mapping[str, Component]) -> Any:
         """Return what is offered over a wire, as what carries the receiver has it."""
-        offer = self._asked(wire.source, "offer", wire.output)
-        carrying = self.components[wire.target].context.platform
+        offer = self._asked(components[wire.source], "offer", wire.output)
+        carrying = components[wire.target].context.platform
         if carrying in self._sources.get(wire.source, ()):
             return offer.seen_from(carrying)
         return offer
 
-    def _plan_effects(self, wrap: WrapEffect | None) -> list[Planned]:
-        """Decide which effects exist in this run and build them."""
-        planned: list[Planned] = []
+    def _each(self, name: str) -> list[Component]:
+        """Return the instances of a block, each once, in order of time."""
+        return list({id(of[name]): of[name] for of in self.stretches}.values())
+
+    def _plan_effects(self, wrap: WrapEffect | None) -> list[list[Planned]]:
+        """Decide which effects exist in each stretch and build them."""
+        planned: dict[int, list[Planned]] = {}
         problems: list[Problem] = []
-        tolerance = self._scene.tolerance
-        for name, component in self.components.items():
-            component.context.duration_s = self.duration_s
-            with self._preparing(name, problems):
-                planned += build_effects(
-                    component, tolerance, everything=self._everything, wrap=wrap
-                )
+        for number, components in enumerate(self.stretches):
+            tolerance = self._scenes[number].tolerance
+            for name, component in components.items():
+                if id(component) in planned:
+                    continue
+                component.context.duration_s = self.duration_s
+                planned[id(component)] = []
+                with self._preparing(name, problems):
+                    planned[id(component)] = build_effects(
+                        component, tolerance, everything=self._everything, wrap=wrap
+                    )
         _raise_any(problems)
-        return planned
+        return [
+            [item for component in of.values() for item in planned[id(component)]]
+            for of in self.stretches
+        ]
 
     def _set_up(self) -> None:
         problems: list[Problem] = []
         for name in sorted(self.components, key=lambda name: (-self._place[name], name)):
-            component = self.components[name]
-            component.context.consumers = [
-                Consumer(
-                    wire.target,
-                    wire.input,
-                    self._asked(wire.target, "request", wire.input),
-                    self.components[wire.target].context.platform,
-                )
-                for wire in self._scene.wires
-                if wire.source == name
-            ]
-            with self._preparing(name, problems):
-                component.setup()
+            consumers = self._consumers(name)
+            each = self._each(name)
+            for component in each:
+                component.context.consumers = consumers
+                with self._preparing(name, problems):
+                    component.setup()
+            for component in each[1:] if not problems else ():
+                if [*component.records()] != [*each[0].records()]:
+                    message = "records something else after a change: that it cannot"
+                    problems.append(self._scene.problem(f"blocks.{name}", message))
         _raise_any(problems)
+
+    def _consumers(self, name: str) -> list[Consumer]:
+        """Return the blocks that a block feeds, with all that each of them asks."""
+        consumers: list[Consumer] = []
+        for wire in self._scene.wires:
+            if wire.source == name:
+                of_wire: list[Consumer] = []
+                for target in self._each(wire.target):
+                    asked = self._asked(target, "request", wire.input)
+                    platform = target.context.platform
+                    consumer = Consumer(wire.target, wire.input, asked, platform)
+                    if not any(_same(consumer, one) for one in of_wire):
+                        of_wire.append(consumer)
+                consumers += of_wire
+        return consumers
 
     @contextmanager
     def _preparing(self, name: str, problems: list[Problem]) -> Iterator[None]:
@@ -160,14 +240,22 @@ class Assembly:
             path = self._scene.blocks[name].cls.path()
             raise SetupFailure(name, path, 0.0, None, error_text(error)) from error
 
-    def _asked(self, name: str, what: str, *arguments: Any) -> Any:
+    def _asked(self, component: Component, what: str, *arguments: Any) -> Any:
         """Return what a method of a block returns before the run."""
         problems: list[Problem] = []
         answer = None
-        with self._preparing(name, problems):
-            answer = getattr(self.components[name], what)(*arguments)
+        with self._preparing(component.name, problems):
+            answer = getattr(component, what)(*arguments)
         _raise_any(problems)
         return answer
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Return whether two words of blocks say the same; not where they cannot be compared."""
+    try:
+        return bool(one == other)
+    except ValueError:  # arrays
+        return False
 
 
 def _raise_any(problems: list[Problem]) -> None:

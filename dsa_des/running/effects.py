@@ -219,22 +219,31 @@ def may_be_late(wire: Wire, everything: bool) -> bool:
 class WireFaults:
     """Keyed faults of one wire; a row's fate depends on the wire, its run and its instant only.
 
-    Each row is late by a uniformly drawn part of `jitter_ticks`; draws are named after the wire.
+    Each row is late by `late_ticks` and a uniformly drawn part of `jitter_ticks`; draws are named
+    after the wire. From each of `from_ticks` on, rows that are made have the next value of each.
     """
 
-    jitter_ticks: float
-    drop_probability: float
+    from_ticks: IntArray
+    late_ticks: IntArray
+    jitter_ticks: FloatArray
+    drop_probability: FloatArray
     jitter: Stream
     drops: Stream
     ticks_per_s: int
 
-    def kept(self, sent: RunTicks) -> BoolArray:
-        """Return which rows sent at some instants are not lost."""
-        return self._drawn(self.drops, sent) >= self.drop_probability
+    def kept(self, made: RunTicks) -> BoolArray:
+        """Return which rows made at some instants are not lost."""
+        return self._drawn(self.drops, made) >= self.drop_probability[self._stretch(made)]
 
-    def lateness(self, sent: RunTicks) -> IntArray:
-        """Return the extra delay of rows sent at some instants, in ticks."""
-        return np.rint(self._drawn(self.jitter, sent) * self.jitter_ticks).astype(np.int64)
+    def lateness(self, made: RunTicks) -> IntArray:
+        """Return the extra delay of rows made at some instants, in ticks."""
+        of = self._stretch(made)
+        drawn = np.rint(self._drawn(self.jitter, made) * self.jitter_ticks[of]).astype(np.int64)
+        return self.late_ticks[of] + drawn
+
+    def _stretch(self, made: RunTicks) -> IntArray:
+        of: IntArray = np.searchsorted(self.from_ticks, made.tick, side="right") - 1
+        return of
 
     def _drawn(self, stream: Stream, sent: RunTicks) -> FloatArray:
         instant = nanosecond_of(sent.tick, self.ticks_per_s)

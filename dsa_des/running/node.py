@@ -29,6 +29,8 @@ from dsa_des.running.channel import Channel, Inputs
 from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
 from dsa_des.running.processors import Processor
 from dsa_des.running.windows import Window
+from dsa_des.stretches.outages import Outages
+from dsa_des.stretches.stretched_block import StretchedBlock
 from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.run_clock import RunClock
 
@@ -87,6 +89,10 @@ class Node:
     subscribers: dict[str, list[tuple[Channel, "Node", str]]] = field(default_factory=dict)
     #: What handles the wakes: the block itself, or its instances, one per replica.
     runner: Any = None
+    #: Its instances in each stretch of time, where it changes while it runs.
+    stretched: StretchedBlock | None = None
+    #: When it is out, where it fails at random.
+    outages: Outages | None = None
     #: Whether it may run ahead of the window (`Window.ahead`).
     ahead: bool = False
 
@@ -105,6 +111,18 @@ class Node:
     @cached_property
     def _trigger_wires(self) -> list[Channel]:
         return [wire for port in self._trigger_ports for wire in self.channels.get(port, ())]
+
+    @property
+    def last(self) -> Component:
+        """The block as it is now, with what it remembers."""
+        return self.component if self.stretched is None else self.stretched.now
+
+    @property
+    def things(self) -> list[object]:
+        """All whose attributes hold its state."""
+        if self.stretched is not None:
+            return self.stretched.things
+        return [self.component, *self.component.context.effects.values()]
 
     @property
     def wires(self) -> list[Channel]:
@@ -146,11 +164,13 @@ class Node:
     def undone(self) -> Mapping[str, IntArray]:
         """Return in which runs it never ran, as counts (2, runs), where there are any."""
         idle = self._idle_runs()
+        out = {} if self.outages is None else self.outages.undone()
         if self.component.process is not None or not idle.any():
-            return {}
+            return out
         ports = [name for name in self.channels if self.component.inputs[name].held]
         why = f", for nothing came at {' and '.join(sorted(ports))}" if ports else ""
-        return {f"it never ran{why}": np.array([idle, np.ones(len(idle))], dtype=np.int64)}
+        never = np.array([idle, np.ones(len(idle))], dtype=np.int64)
+        return {f"it never ran{why}": never, **out}
 
     def _idle_runs(self) -> BoolArray:
         ran, runs = self._ran, self.simulation.runs.count
@@ -289,18 +309,29 @@ class Node:
         self, instants: RunTicks, scans: IntArray, end: int, idle: BoolArray | None = None
     ) -> None:
         before = None if self.clock is None else self.clock.before
+        if self.outages is not None and not (up := self.outages.up(instants)).all():
+            instants, scans = instants.take(up), scans[up]
+            idle = None if idle is None else idle[up]
+            if not len(instants):
+                return
         wake = self._inputs.seen(
             instants, scans, end, self._rows_asked_for, clock=before, idle=idle
         )
         if wake is None:
             return
+        if self.outages is not None:
+            wake = self.outages.heard(wake)
         ticks = wake.ticks
         if not self._all_ran:
             self._ran = ~self._idle_runs()
             self._ran[wake.run[wake.instants.first_of_each]] = True
             self._all_ran = bool(self._ran.all())
         try:
-            self.send(self.runner.run(wake), wake.instants)
+            if self.stretched is None:
+                self.send(self.runner.run(wake), wake.instants)
+            else:
+                for runner, part in self.stretched.parts(wake):
+                    self.send(runner.run(part), part.instants)
         except (Abort, RunRefused):
             raise
         except BaseException as error:

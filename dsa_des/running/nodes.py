@@ -1,7 +1,7 @@
 """From the blocks and wires of a scene to running blocks with channels between them."""
 
 import random
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import simpy
 
@@ -24,13 +24,13 @@ from dsa_des.time.randomness import Streams
 def build_nodes(
     run: RunState,
     timeline: Timeline,
-    components: Mapping[str, Component],
+    stretches: Sequence[Mapping[str, Component]],
     grain: Grain,
     processors: Mapping[str, Processor],
     shuffle_ties: int | None,
 ) -> dict[str, Node]:
     """Return the running blocks, which no wire connects yet."""
-    scene = timeline.scene
+    scene, components = timeline.scene, stretches[0]
     # Who ends runs comes before all that it does not depend on: that is not run beyond the end.
     ending = [name for name, block in components.items() if ends_its_run(type(block))]
     depth, order = depths(scene.graph, ending), grain.order(scene, ending)
@@ -42,29 +42,37 @@ def build_nodes(
         by_name = base + number / (len(components) + 1)
         node = Node(run, component, windowed, _priority(base, by_name, shuffle))
         node.runner = timeline.runner(component)
+        node.stretched = timeline.stretched([of[name] for of in stretches])
         node.clock = timeline.clock(name, component)
         node.pulse = timeline.pulse(component)
         node.processor = processors.get(scene.blocks[name].options.processor or "")
         node.ahead = name in grain.ahead
+        node.outages = timeline.outages(name)
         node.on_demand = component.clocked == "demand" and node.clock is None
         nodes[name] = node
     return nodes
 
 
 def build_processors(
-    scene: Scene, grain: Grain, env: simpy.Environment, record: Callable[[str, Message], None]
+    timeline: Timeline,
+    grain: Grain,
+    env: simpy.Environment,
+    record: Callable[[str, Message], None],
 ) -> dict[str, Processor]:
     """Return the shared processors of a scene.
 
     A `SceneError` says which parameters make no sense.
     """
+    scene = timeline.scene
     streams = Streams(scene.seed)
     order = grain.order(scene)
     ticks_per_s = scene.ticks_per_s
     processors: dict[str, Processor] = {}
     for name, p in scene.processors.items():
         try:
-            service = Service(name, p, ticks_per_s, streams.stream(name, "service time"))
+            of_stretches = [p, *(one.scene.processors[name] for one in scene.stretches)]
+            draws = streams.stream(name, "service time")
+            service = Service(name, of_stretches, timeline.from_ticks, ticks_per_s, draws)
         except ValueError as error:
             raise SceneError([scene.problem("processors", str(error))]) from error
         at_once = WINDOW_PRIORITY + order[queue_key(name)] if name in grain.queues else None
@@ -84,9 +92,10 @@ def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None
     A `SceneError` says which delay makes no sense, or which block that runs on demand has nobody to
     demand anything.
     """
-    for wire in scene.wires:
-        delay = round(wire.total_delay_s * scene.ticks_per_s) + _scan_delay(scene, wire, nodes)
-        channel = timeline.channel(wire, delay)
+    of_stretches = [scene.wires, *(stretch.scene.wires for stretch in scene.stretches)]
+    for wires in zip(*of_stretches, strict=True):
+        wire = wires[0]
+        channel = timeline.channel(wires, _scan_delay(scene, wire, nodes))
         if isinstance(wire.holds, dict):
             declared = nodes[wire.target].component.inputs[wire.input].message
             channel.hold(declared.initial(wire.holds), 0)
@@ -98,6 +107,13 @@ def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None
         nodes[wire.source].subscribers.setdefault(wire.output, []).append(
             (channel, target, wire.input)
         )
+    for wires in zip(*of_stretches, strict=True):
+        if len({wire.total_delay_s for wire in wires}) > 1 and _is_foreseen(nodes, wires[0]):
+            message = (
+                f"{wires[0]}: its delay cannot change while a run lasts: {wires[0].source} runs on "
+                "demand, ahead of scans by so much"
+            )
+            raise SceneError([scene.problem("changes", message)])
     for name, node in nodes.items():
         node.demands = find_demands(nodes, name)
         if node.on_demand and not node.demands:
@@ -122,6 +138,21 @@ def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
                 seen.add(reached)
                 todo.append(reached)
     return [demands[key] for key in sorted(demands)]
+
+
+def _is_foreseen(nodes: Mapping[str, Node], wire: Wire) -> bool:
+    """Return whether what comes over a wire is asked of a block that runs on demand."""
+    target, todo, seen = nodes[wire.target], [wire.source], {wire.source}
+    if target.clock is None and not find_demands(nodes, wire.target):
+        return False
+    while todo:
+        node = nodes[todo.pop()]
+        if node.on_demand:
+            return True
+        before = {channel.source for channel in node.wires} - seen if node.clock is None else set()
+        seen |= before
+        todo += before
+    return False
 
 
 def horizon_ticks(nodes: Mapping[str, Node], opened: Collection[Edge]) -> int | None:
@@ -156,6 +187,9 @@ def _scan_delay(scene: Scene, wire: Wire, nodes: Mapping[str, Node]) -> int:
     if clock is None:
         message = f"{wire}: a delay in scans needs a scan clock at one of its ends"
         raise SceneError([scene.problem("wires", message)])
+    if clock.changes:
+        message = f"{wire}: a delay in scans needs a scan clock that does not change"
+        raise SceneError([scene.problem("changes", message)])
     # Rounded down: a message must not arrive a tick after the scan it was sent for.
     delay = wire.delay_scans * int(clock.period)
     if delay >= MAX_TICK:

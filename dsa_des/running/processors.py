@@ -12,7 +12,7 @@ is done. Both give the same.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, ClassVar
@@ -68,27 +68,36 @@ class Processing(Message):
 class Service:
     """How long a processor works on each message: draws are keyed by block and instant.
 
-    A `ValueError` says so if that is shorter than one tick.
+    From each of `from_ticks` on, what enters is worked on as the next of `parameters` say. A
+    `ValueError` says so if that is shorter than one tick.
     """
 
     def __init__(
-        self, name: str, parameters: ProcessorParameters, ticks_per_s: int, stream: Stream
+        self,
+        name: str,
+        parameters: Sequence[ProcessorParameters],
+        from_ticks: IntArray,
+        ticks_per_s: int,
+        stream: Stream,
     ) -> None:
-        self._least = round(parameters.service_s * ticks_per_s)
-        self._spread = float(parameters.service_spread_s * ticks_per_s)
+        self._from_ticks = from_ticks
+        self._least = np.array([round(p.service_s * ticks_per_s) for p in parameters])
+        self._spread = np.array([float(p.service_spread_s * ticks_per_s) for p in parameters])
         self._stream = stream
         self._ticks_per_s = ticks_per_s
-        if self._least < 1:
+        if self._least.min() < 1:
             raise ValueError(f"processors.{name}: service_s is shorter than one tick")
 
     def ticks(self, blocks: Iterable[str], entered: IntArray) -> IntArray:
         """Return the time for each message, by its block and the tick at which it entered."""
-        if not self._spread:
-            return np.full(len(entered), self._least, dtype=np.int64)
+        of = np.searchsorted(self._from_ticks, entered, side="right") - 1
+        least: IntArray = self._least[of]
+        if not self._spread.any():
+            return least
         pairs = zip(blocks, nanosecond_of(entered, self._ticks_per_s).tolist(), strict=True)
         keys = np.array([key_of("job", block, tick) for block, tick in pairs], dtype=np.uint64)
-        extra = np.rint(self._stream.uniform(keys, 0) * self._spread)
-        return self._least + extra.astype(np.int64)
+        extra = np.rint(self._stream.uniform(keys, 0) * self._spread[of])
+        return least + extra.astype(np.int64)
 
 
 @dataclass(eq=False)

@@ -40,7 +40,32 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
         for text in attempt(f"blocks.{name}: warnings", notes, component.warnings) or ():
             notes.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
         notes += [f"blocks.{name}: {text}" for text in _vain_times(simulation, name)]
+    for text in _of_stretches(simulation, notes):
+        notes.append(text)
     return _unacknowledged(scene, [*notes, *_slowed(simulation)])
+
+
+def _of_stretches(simulation: Simulation, said: list[str]) -> Iterator[str]:
+    """Yield what is to be noted of blocks only after something has changed."""
+    scene = simulation.scene
+    for number, stretch in enumerate(scene.stretches, start=1):
+        before = simulation.stretches[number - 1]
+        for name, component in simulation.stretches[number].items():
+            if component is before[name]:
+                continue
+            notes: list[str] = []
+            texts = list(component.p.without_effect())
+            texts += attempt(f"blocks.{name}: warnings", notes, component.warnings) or ()
+            new = [text for text in texts if f"blocks.{name}: {text}" not in said]
+            for text in (*notes, *new):
+                begins_s = f"from {float(stretch.from_s):g} s"
+                yield f"blocks.{name}: {begins_s}: {shortened(str(text), _LONGEST)}"
+    for name, number in sorted(simulation.unheard.items()):
+        yield (
+            f"blocks.{name}: goes on by what its neighbours said at the start, though from "
+            f"{float(scene.stretches[number - 1].from_s):g} s they say otherwise: "
+            f"{scene.classes[name].path()} does not say what it remembers"
+        )
 
 
 def _vain_times(simulation: Simulation, name: str) -> Iterator[str]:

@@ -123,15 +123,18 @@ class Simulation:
             scene, timeline, recorder, simulate_everything, wrap_effect, grain.rewinds
         )
         self.components: Mapping[str, Component] = assembly.components
+        #: The blocks of each stretch of time between two changes, and what became of their effects.
+        self.stretches, self.plans = assembly.stretches, assembly.plans
+        self.unheard = assembly.unheard
         self.duration_s: Fraction = assembly.duration_s
-        self.plan = assembly.plan
+        self.plan = self.plans[0]
         self.timeline.set_length(self.components, self.duration_s)
         #: How the runs lie in time, and when they end.
         self.runs = self.timeline.runs
         self._check_ends()
-        self._processors = build_processors(scene, grain, self.env, self._record)
+        self._processors = build_processors(timeline, grain, self.env, self._record)
         self.nodes = build_nodes(
-            self, self.timeline, self.components, grain, self._processors, shuffle_ties
+            self, self.timeline, self.stretches, grain, self._processors, shuffle_ties
         )
         connect(scene, self.nodes, self.timeline)
         check_reach(scene, self.nodes, self.runs.run_ticks)
@@ -150,7 +153,12 @@ class Simulation:
     @property
     def timing_plan(self) -> list[Planned]:
         """Which effects of time exist in this run: latencies, wires, clocks, processors."""
-        return timing_plan(self.scene, everything=self._everything)
+        return self.timing_plan_of(0)
+
+    def timing_plan_of(self, stretch: int) -> list[Planned]:
+        """Return the same of a stretch of the scene, 0 for that at its start."""
+        scene = self.scene.stretches[stretch - 1].scene if stretch else self.scene
+        return timing_plan(scene, everything=self._everything)
 
     @property
     def end_tick(self) -> int:
@@ -201,6 +209,7 @@ class Simulation:
                 progress(final / self.ticks_per_s)
         if self.recorder is not None:
             self._recorded(self.recorder.close)
+        self.components = {name: node.last for name, node in self.nodes.items()}
         if self.runs.early and self.runs.count == 1:
             self.duration_s = Fraction(int(self.runs.ends[0]), self.ticks_per_s)
             for component in self.components.values():

@@ -19,6 +19,8 @@ from dsa_des.running.grain import Grain, grain_of
 from dsa_des.running.windows import Rewinder, RewindingWindows, Windows
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
+from dsa_des.stretches.outages import Outages
+from dsa_des.stretches.stretched_block import StretchedBlock
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
 from dsa_des.time.run_clock import RunClock
@@ -61,8 +63,21 @@ class Timeline:
         def jitter(number: int) -> Callable[[IntArray], FloatArray]:
             return Streams(self.seeds[number]).scan_normals(name, "clock jitter")
 
-        everything = self._everything
-        return RunClock(specs, self.scene.ticks_per_s, self.runs, jitter, always_draws=everything)
+        return RunClock(
+            specs, self.scene.ticks_per_s, self.runs, jitter,
+            always_draws=self._everything, changes=self._clock_changes(name, component, specs),
+        )  # fmt: skip
+
+    def _clock_changes(
+        self, name: str, component: Component, specs: list[ClockSpec]
+    ) -> list[tuple[int, list[ClockSpec]]]:
+        """Return from when on a block's clock is another one, and what each run says of it then."""
+        changes = []
+        for number, tick in enumerate(self.from_ticks.tolist()[1:]):
+            if (later := self.clock_specs(name, component, number)) != specs:
+                changes.append((tick, later))
+                specs = later
+        return changes
 
     def pulse(self, component: Component) -> RunClock | None:
         """Return when a block is woken though nothing comes, or None where it never is."""
@@ -72,23 +87,55 @@ class Timeline:
         specs = [ClockSpec(1 / every_s, every_s)] * self.runs.count
         return RunClock(specs, self.scene.ticks_per_s, self.runs, _no_jitter)
 
-    def clock_specs(self, name: str, component: Component) -> list[ClockSpec]:
-        """Return what each run says of a block's clock; none where it has none of its own."""
-        spec = component.clock_of(component.p)
+    def clock_specs(
+        self, name: str, component: Component, stretch: int | None = None
+    ) -> list[ClockSpec]:
+        """Return what each run says of a block's clock; none where it has none of its own.
+
+        That is at the start, or in a stretch.
+        """
+        parameters = component.p
+        if stretch is not None:
+            parameters = self.scene.stretches[stretch].scene.blocks[name].parameters
+        spec = component.clock_of(parameters)
         return [] if spec is None else [spec]
 
-    def channel(self, wire: Wire, delay_ticks: int) -> Channel:
-        """Return the receiving end of a wire, with its faults."""
-        faults = None
-        if may_be_late(wire, self._everything):
-            faults = self.wire_faults(wire)
-        return Channel(wire.source, delay_ticks, faults, self.runs)
+    def channel(self, wires: Sequence[Wire], scan_delay_ticks: int) -> Channel:
+        """Return the receiving end of a wire, with its faults.
 
-    def wire_faults(self, wire: Wire) -> WireFaults:
-        """Return what happens to the rows on a wire that loses or delays some."""
-        per_s = self.scene.ticks_per_s
-        late, lost = (self.streams.stream(str(wire), f"wire {kind}") for kind in ("jitter", "loss"))
-        return WireFaults(float(wire.jitter_s * per_s), wire.drop_probability, late, lost, per_s)
+        `wires` are what the scene says of it in each stretch.
+        """
+        per_s, wire = self.scene.ticks_per_s, wires[0]
+        delays = np.array([round(one.total_delay_s * per_s) for one in wires], dtype=np.int64)
+        least = int(delays.min())
+        faults = None
+        if any(may_be_late(one, self._everything) for one in wires) or (delays > least).any():
+            late, lost = (self.streams.stream(str(wire), f"wire {of}") for of in ("jitter", "loss"))
+            jitter_ticks = np.array([float(one.jitter_s * per_s) for one in wires])
+            losses = np.array([one.drop_probability for one in wires])
+            faults = WireFaults(
+                self.from_ticks, delays - least, jitter_ticks, losses, late, lost, per_s
+            )
+        return Channel(wire.source, least + scan_delay_ticks, faults, self.runs)
+
+    @property
+    def from_ticks(self) -> IntArray:
+        """The first tick of each stretch of the scene."""
+        instants_s = [Fraction(0), *(stretch.from_s for stretch in self.scene.stretches)]
+        return np.array([t * self.scene.ticks_per_s for t in instants_s], dtype=np.int64)
+
+    def outages(self, name: str) -> Outages | None:
+        """Return when a block is out, or None where it never is."""
+        failing = [one for one in self.scene.outages if name in one.blocks]
+        if not failing:
+            return None
+        return Outages(failing, self.streams, self.runs, self.scene.ticks_per_s)
+
+    def stretched(self, instances: Sequence[Component]) -> StretchedBlock | None:
+        """Return what handles the wakes of a block in each stretch; None where one does in all."""
+        if all(one is instances[0] for one in instances):
+            return None
+        return StretchedBlock(self.from_ticks, instances)
 
     def grain(self, window: int | None) -> Grain:
         """Return at which grain the blocks run; see `Simulation` for the parameters."""

@@ -64,6 +64,10 @@ class RunningBlock(Protocol):
         """The block itself."""
 
     @property
+    def things(self) -> Sequence[object]:
+        """All whose attributes hold its state."""
+
+    @property
     def wires(self) -> Sequence[Channel]:
         """The wires into it."""
 
@@ -156,10 +160,7 @@ class Rewinder:
     ) -> None:
         self._recorder = recorder
         self._things: list[Any] = [
-            thing
-            for node in nodes
-            for thing in (node.component, *node.component.context.effects.values())
-            if hasattr(thing, "__dict__")
+            thing for node in nodes for thing in node.things if hasattr(thing, "__dict__")
         ]
         self._things.append(runs)
         into = [(node.name, channel) for node in nodes for channel in node.wires]

@@ -15,7 +15,13 @@ from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.block.registry import NotImported, UnknownType, find, section_models
 from dsa_des.block.source_file import absolute
 from dsa_des.errors import did_you_mean, nearest
-from dsa_des.scene.block_table import Block, BlockOptions, ProcessorParameters, split_options
+from dsa_des.scene.block_table import (
+    Block,
+    BlockOptions,
+    Outage,
+    ProcessorParameters,
+    split_options,
+)
 from dsa_des.scene.graph import unfed_inputs
 from dsa_des.scene.keys import Key, dotted
 from dsa_des.scene.overrides import drop_of_other_type
@@ -358,3 +364,36 @@ def read_processors(
             message = f"the scene has no such processor{declared}"
             scene_file.report(("blocks", name, "processor"), message, str(wanted))
     return {name: processor for name, processor in read.items() if processor is not None}
+
+
+#: Outages of a run, on average: more are a slip of the pen.
+_MOST_OUTAGES = 100_000
+
+
+def read_outages(scene_file: SceneFile, blocks: Mapping[str, Any], duration_s: Any) -> list[Outage]:
+    """Return the outages of a scene; what is wrong with them is reported."""
+    entries = scene_file.data.get("outages", [])
+    if not isinstance(entries, list):
+        scene_file.report(("outages",), "must be a list of tables: [[outages]]", entries)
+        return []
+    read: list[Outage] = []
+    for number, entry in enumerate(entries):
+        outage = read_table(scene_file, ("outages", number), Outage, entry)
+        if outage is None:
+            continue
+        for name in outage.blocks:
+            cls = blocks.get(name)
+            if name not in blocks:
+                message = f"the scene has no such block{did_you_mean(name, blocks)}"
+                scene_file.report(("outages", number, "blocks"), message, str(name))
+            elif cls is not None and cls.process is not None:
+                message = f"{name} has a process of its own, which an outage cannot stop"
+                scene_file.report(("outages", number, "blocks"), message)
+        if outage.key in [one.key for one in read]:
+            message = "fails already: give each a name of its own, which keys its draws"
+            scene_file.report(("outages", number), message, outage.key)
+        if duration_s is not None and duration_s > _MOST_OUTAGES * outage.mean_between_s:
+            message = f"must be longer: at most {_MOST_OUTAGES:,} failures of a run are drawn"
+            scene_file.report(("outages", number, "mean_between_s"), message, outage.mean_between_s)
+        read.append(outage)
+    return read

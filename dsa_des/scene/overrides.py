@@ -131,7 +131,7 @@ def apply_changes(
             name = key.removeprefix(SWAP)
             dropped += swap_type(scene, name, value, swap_source, option)
         else:
-            scene.problems += _set_value(scene, key, deepcopy(value), source)
+            scene.problems += set_value(scene, key, deepcopy(value), source)
     return dropped
 
 
@@ -144,10 +144,10 @@ def apply_sets(study: SceneFile, assignments: Iterable[str]) -> None:
             message = f"is a key of the study's scene: set.{text}"
             study.problems.append(Problem(COMMAND_LINE, text, message))
         else:
-            study.problems += _set_value(study, text, value, COMMAND_LINE)
+            study.problems += set_value(study, text, value, COMMAND_LINE)
 
 
-def _set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:
+def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:
     """Put a value at a dotted key of the scene's tables and return what is wrong with that.
 
     Items of lists go by number or name: ``blocks.traffic.intruders[0].east_m``, or

@@ -15,7 +15,15 @@ from dsa_des.block.component import Component, Context, Parameters, as_written
 from dsa_des.block.foreign_calls import REFUSALS, must_pass, why_refused
 from dsa_des.block.registry import section_models
 from dsa_des.errors import Problem, SceneError, UsageError, did_you_mean
-from dsa_des.scene.block_table import Block, ProcessorParameters
+from dsa_des.scene.block_table import Block, Outage, ProcessorParameters
+from dsa_des.scene.changes import (
+    CHANGES,
+    Stretch,
+    TimedChange,
+    read_timed_changes,
+    stretches_of,
+    ticks_of_all,
+)
 from dsa_des.scene.checks import (
     check_activity,
     check_effects,
@@ -23,6 +31,7 @@ from dsa_des.scene.checks import (
     read_blocks,
     read_clocks,
     read_duration,
+    read_outages,
     read_processors,
     read_sections,
     read_seed,
@@ -44,7 +53,10 @@ from dsa_des.scene.wiring import Wire, read_wires, with_latencies
 from dsa_des.text.safe_text import printable, shortened
 from dsa_des.time.randomness import Streams
 
-_TOP_LEVEL = ("title", "description", "duration_s", "seed", "blocks", "wires", "processors")
+_TOP_LEVEL = (
+    "title", "description", "duration_s", "seed", "blocks", "wires", "processors", "outages",
+    CHANGES,
+)  # fmt: skip
 _TOLERANCE = "accuracy"
 # Of what a scene is shown as in Python.
 _WIDTH, _MOST_LINES = 84, 5
@@ -77,6 +89,12 @@ class Scene:
         Dotted keys of parameters that a swap dropped.
     notes : list of str
         What else was done to the scene that its files do not show.
+    changes : list of TimedChange
+        What changes while a run lasts.
+    stretches : list of Stretch
+        What the scene is after each instant at which something changes; none where nothing does.
+    outages : list of Outage
+        Which blocks fail at random.
     """
 
     path: Path
@@ -92,6 +110,9 @@ class Scene:
     processors: dict[str, ProcessorParameters] = field(default_factory=dict)
     dropped: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    changes: list[TimedChange] = field(default_factory=list)
+    stretches: list[Stretch] = field(default_factory=list)
+    outages: list[Outage] = field(default_factory=list)
     #: What is in the file that it was made of, where that is no scene.
     about: list[str] = field(default_factory=list)
     #: The tables it was made of, changes included.
@@ -241,6 +262,11 @@ class Scene:
             values = section.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
             if values:
                 tables[name] = values
+        if self.changes:
+            tables[CHANGES] = [change.written() for change in self.changes]
+        if self.outages:
+            written = (one.model_dump(mode="json", exclude_none=True) for one in self.outages)
+            tables["outages"] = list(written)
         if self.processors:
             tables["processors"] = {
                 name: parameters.model_dump(mode="json")
@@ -358,6 +384,11 @@ def check_scene(scene_file: SceneFile) -> Scene:
         notes=notes,
     )
     scene._tables = scene_file
+    scene.outages = read_outages(scene_file, classes, duration)
+    if CHANGES in data:
+        scene.changes = read_timed_changes(scene_file, classes, wires)
+        scene.stretches = stretches_of(scene_file, scene, scene.changes, check_scene)
+        scene.ticks_per_s = ticks_of_all(scene_file, scene)
     if scene_file.problems and len(sections) == len(section_models()):
         scene_file.problems += _refused_by_themselves(scene)
     scene_file.refuse()

@@ -28,6 +28,8 @@ _NAME = r"[A-Za-z_][\w-]*"
 _END = re.compile(rf"{_NAME}(\.[A-Za-z_]\w*)?")
 _SCANS = re.compile(r"([0-9]+) scans?")
 _MOST_SCANS = 1_000_000
+#: Options of a wire that may change while a run lasts.
+MAY_CHANGE = ("delay_s", "jitter_s", "drop_probability")
 _KEYS = ("from", "to", "delay_s", "delay", "jitter_s", "drop_probability", "holds")
 
 

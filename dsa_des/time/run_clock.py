@@ -1,11 +1,13 @@
 """The scan clock of a block in every run of a scene."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import IntArray
+from dsa_des.time.changing_clock import ChangingClock
 from dsa_des.time.clock import ClockSpec, ScanClock
 from dsa_des.time.runs import Runs
 
@@ -22,7 +24,8 @@ class RunClock:
     """One block's scans in every run, each of which has its own `specs`.
 
     Given a run's number, `jitter` returns the draws of its clock's jitter; with `always_draws` it
-    draws also where that is 0.
+    draws also where that is 0. `changes` are from which ticks on the clocks are others, and the
+    specs of every run then.
     """
 
     def __init__(
@@ -33,16 +36,22 @@ class RunClock:
         jitter: Callable[[int], Callable[[IntArray], np.ndarray]],
         *,
         always_draws: bool = False,
+        changes: Sequence[tuple[int, Sequence[ClockSpec]]] = (),
     ) -> None:
-        self.spec = specs[0]
+        self.spec, self.changes = specs[0], changes
         self._runs = runs
         rates = {(spec.rate_hz, spec.rate_error_ppm, spec.jitter_s) for spec in specs}
         # Clocks that differ in their offsets only are one array expression.
-        self._alike = len(rates) == 1 and self.spec.jitter_s == 0 and not always_draws
-        self._clocks = [
-            ScanClock(spec, ticks_per_s, jitter(number), always_draws=always_draws)
-            for number, spec in enumerate(specs[:1] if self._alike else specs)
-        ]
+        self._alike = len(rates) == 1 and self.spec.jitter_s == 0 and not (always_draws or changes)
+
+        def clock(number: int, spec: ClockSpec) -> Any:
+            if not changes:
+                return ScanClock(spec, ticks_per_s, jitter(number), always_draws=always_draws)
+            mine = [(tick, later[number]) for tick, later in changes]
+            return ChangingClock(spec, mine, ticks_per_s, jitter(number), always_draws=always_draws)
+
+        each = enumerate(specs[:1] if self._alike else specs)
+        self._clocks = [clock(number, spec) for number, spec in each]
         self.period = min(clock.period for clock in self._clocks)
         self._offsets = np.array([spec.offset_s * ticks_per_s for spec in specs], dtype=np.int64)
         self._going = range(0)  # those whose scans are kept in `_last` and `_read`
@@ -51,7 +60,7 @@ class RunClock:
         self._none = (0, -1)  # no scan from the first of these ticks on lies before the second
 
     @property
-    def first(self) -> ScanClock:
+    def first(self) -> Any:
         """The clock of the first run."""
         return self._clocks[0]
 

@@ -1,6 +1,7 @@
 """What is shown lies where it is: contacts, the area of a loss, the camera's silhouette."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pymap3d
@@ -10,6 +11,7 @@ from pymap3d import vincenty
 
 import dsa_des
 from components.aircraft.aircraft import VisibleAreas
+from components.cdti import control
 from components.cdti.camera import silhouette
 from components.cdti.contacts import (
     Contacts,
@@ -208,3 +210,13 @@ def test_the_silhouette_rolls_with_the_ownship():
     right = banked[np.argmax(banked[:, 0])]
     assert np.abs(level[:, 1]).max() < 1e-9
     assert math.degrees(math.atan2(right[1], right[0])) == pytest.approx(30.0)
+
+
+def test_a_new_page_is_told_the_last_two_hundred_decisions():
+    told = object.__new__(control.SessionControl)
+    told.scope = None
+    told._scene, told._console = SimpleNamespace(title="t", duration_s=None), None
+    told._factor, told._units, told._began, told._waits = 1.0, "si", True, False
+    for count in (3, 201, 500):
+        told._log = list(range(count))
+        assert told.welcome("watcher")["log"] == told._log[-200:]

@@ -24,7 +24,7 @@ from components.estimation.carried_errors import (
 )
 from components.estimation.estimator import Estimates, ExtendedKalmanFilter, pair_measurement
 from components.estimation.frame import pose_in_frame
-from components.estimation.kalman import linear_moments
+from components.estimation.kalman import linear_moments, updated
 from components.estimation.measurement import Kind
 from components.estimation.motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn
 from components.estimation.unscented import SigmaPoints, UnscentedKalmanFilter
@@ -256,3 +256,46 @@ def test_what_is_told_of_a_turn_is_expected_as_it_was():
         found.total[..., 0], found.jacobian[..., 0] @ covariance[..., 0] @ found.jacobian[..., 0].T,
         rtol=1e-9, atol=1e-12,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("known", [0.2, 0.5])
+def test_a_track_that_later_looks_brought_back_keeps_a_positive_covariance(known):
+    """It knows some of what changed since its last report: less than that report has in common."""
+    model = MotionWithErrors(ConstantVelocity(4.0), LASTS_S)
+    ones, age = np.ones(COUNT), np.linspace(0.05, 0.6, COUNT)
+    covariance = model.noise(0.6 * ones)
+    covariance[:6, :6] *= known
+    for i in range(6):
+        covariance[i, i] += 0.05
+        covariance[6 + i, 6 + i] = 1.0
+    state = np.zeros((12, COUNT))
+    state[:6] = np.array([3000.0, -2000.0, 100.0, 60.0, -30.0, 2.0])[:, np.newaxis]
+    reported = ReportedErrors(WAYS, np.tile(DEVIATION[:, np.newaxis], COUNT), age, ones < 0)
+    seen, slope = reported.linearised(KIND, state, pose())
+    ages = Ages(age, age, 0.6 * ones, 0.0 * ones)
+    moments = ages.added(linear_moments(seen, slope, covariance), model, state, covariance)
+    variance = np.array([1e-10, 1e-10, 1e-4, 0.01, 0.01, 0.01])[:, np.newaxis] * ones
+    found = moments.innovation(variance)
+    _, after = updated(state, covariance, found, np.zeros((6, COUNT)))
+    assert np.linalg.eigvalsh(after.transpose(2, 0, 1)).min() > 0.0
+
+
+def test_what_a_track_and_a_report_may_have_in_common_they_have():
+    """Where nothing came since the last report all that changed is in both."""
+    model = MotionWithErrors(ConstantVelocity(4.0), LASTS_S)
+    ones = np.ones(COUNT)
+    covariance = model.noise(0.6 * ones)
+    for i in range(6):
+        covariance[i, i] += 1.0
+        covariance[6 + i, 6 + i] = 1.0
+    state = np.zeros((12, COUNT))
+    state[0] = 3000.0
+    reported = ReportedErrors(WAYS, np.tile(DEVIATION[:, np.newaxis], COUNT), 0.3 * ones, ones < 0)
+    seen, slope = reported.linearised(KIND, state, pose())
+    ages = Ages(0.3 * ones, 0.3 * ones, 0.6 * ones, 0.0 * ones)
+    before = linear_moments(seen, slope, covariance)
+    _, shared = ages.errors(model, state, covariance[3, 3] * np.ones((3, COUNT)))
+    expected = before.cross + np.einsum("ikn,mkn->imn", shared[:, :3], slope[:, :3])
+    expected += np.einsum("ikn,mkn->imn", shared[:, 3:], slope[:, 3:6])
+    found = ages.added(before, model, state, covariance).cross
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)

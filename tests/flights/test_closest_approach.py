@@ -175,11 +175,14 @@ def place(east_m, up_m):
 
 
 @pytest.mark.parametrize("at_once", [7, 10_000])
-def test_of_several_approaches_the_nearest_is_found_wherever_it_lies(monkeypatch, at_once):
+@pytest.mark.parametrize("power", [1.0, 0.3])
+def test_of_several_approaches_the_nearest_is_found_wherever_it_lies(monkeypatch, at_once, power):
     """Targets that come near and go, six times each at other times, no faster than they may."""
     monkeypatch.setattr(closest_approach, "MOST_AT_ONCE", at_once)
     draw = np.random.default_rng(9)
-    count, step_s, end_s = 40, 0.5, 150.0
+    count, end_s = 40, 150.0
+    every_s = end_s * np.linspace(0.0, 1.0, 301) ** power  # evenly, or far apart at first
+    times = RegularTimes(0.5, end_s) if power == 1.0 else KnownTimes(every_s)
     speed_mps = draw.uniform(20.0, 200.0, count)
     when_s = draw.uniform(0.0, end_s, (6, count))
     nearest_m = draw.uniform(100.0, 2000.0, (6, count))
@@ -191,12 +194,12 @@ def test_of_several_approaches_the_nearest_is_found_wherever_it_lies(monkeypatch
     best = closest_approaches(
         lambda _, time_s: place(np.zeros(len(time_s)), 0.0),
         lambda target, time_s: place(away_m(target, time_s), 0.0),
-        RegularTimes(step_s, end_s), closing_speed_mps=speed_mps,
+        times, closing_speed_mps=speed_mps,
         present_s=(np.full(count, 3.0), np.full(count, 140.0)),
     )  # fmt: skip
-    times = np.arange(6, 281) * step_s
-    every = np.array([away_m(np.full(len(times), k), times) for k in range(count)])
-    assert best.time_s.tolist() == times[every.argmin(axis=1)].tolist()
+    every_s = every_s[(every_s >= 3.0) & (every_s <= 140.0)]
+    every = np.array([away_m(np.full(len(every_s), k), every_s) for k in range(count)])
+    assert best.time_s == pytest.approx(every_s[every.argmin(axis=1)])
     assert best.range_m == pytest.approx(every.min(axis=1), abs=0.01)
 
 

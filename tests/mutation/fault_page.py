@@ -41,11 +41,12 @@ The list above was written together with its tests. These faults were chosen at 
 drawn uniformly from all that the tests execute, then a kind of mistake that it allows (a
 constant, a comparison, a sign, swapped arguments or operands, a dropped term, condition, keyword,
 filter or statement, an off-by-one, `and` for `or`, swapped branches, minimum for maximum, sine
-for cosine, degrees for radians). Tests that execute the line run until one fails, the nearest
-first, within a budget of time.
+for cosine, degrees for radians). Tests that execute the line run until one fails, within a budget
+of time: those of its room, of rooms that import it, and the rest, the cheapest files first.
 
 `python tests/mutation/coverage_map.py --workers 2` makes the map of lines (it needs coverage.py),
 `python tests/mutation/random_faults.py --workers 2 --count 300 --page docs/mutation.md` this table.
+With `-m "not slow"` the map, and with `--fast` the draw, is of the fast tests alone.
 
 The share noticed is of those that are not marked equivalent (`tests/mutation/equivalent.json`,
 each with its reason), with its 95 % interval by Wilson. Not covered: lines that no test executes,

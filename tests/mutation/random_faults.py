@@ -25,6 +25,7 @@ and the reason. The copy is made of the working tree, which is never touched.
 
 import json
 import random
+import re
 import sys
 import tempfile
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
@@ -74,6 +75,10 @@ class Tests:
 
     def __init__(self, known: Map, budget_s: float, tier: str) -> None:
         self._known, self._budget_s, self._tier = known, budget_s, tier
+        self._functions = {test.partition("[")[0] for test in known.seconds}
+        lists = ("slow.txt", "exhaustive.txt") if tier else ()
+        lines = [(ROOT / "tests" / name).read_text(encoding="utf-8").splitlines() for name in lists]
+        self._left_out = {line for each in lines for line in each}
         self._lines = cache(lambda file, text: known.executed(file, text))
 
     def reaches(self, fault: DrawnFault) -> bool:
@@ -86,17 +91,16 @@ class Tests:
         # What is executed where the module is imported concerns all that execute the rest of it.
         tests = lines.get(fault.line) or {test for each in lines.values() for test in each}
         near = order_tests([fault.file])
-        slow = {line.partition("::")[0] for line in _slow_lines()} if self._tier else set()
         of_file = defaultdict(list)
         for test in tests:
             of_file[_file(test)].append(test)
-        known = {_file(test) for test in self._known.seconds} | slow
         cost = {file: sum(map(self._seconds, of_file.get(file, ()))) for file in near}
         rounds: list[list[str]] = [[], [], []]
         spent_s = 0.0
         for file in sorted(near, key=lambda file: (near[file][0], cost[file], near[file][1])):
             # Of what the map does not know only those run that are likely to notice it.
-            wanted = file in of_file or (file not in known and (near[file][0] < REST or not known))
+            likely = near[file][0] < REST or not self._known.seconds
+            wanted = file in of_file or (likely and self._is_new(file))
             if wanted and (spent_s + cost[file] <= self._budget_s or not spent_s):
                 rounds[near[file][0]].append(file)
                 spent_s += cost[file]
@@ -105,6 +109,12 @@ class Tests:
             for some in rounds
             if some
         ]
+
+    def _is_new(self, file: str) -> bool:
+        """Whether a file holds tests that the map does not know; of the tier that is tried."""
+        names = re.findall(r"^def (test_\w+)", (ROOT / file).read_text(encoding="utf-8"), re.M)
+        found = {f"{file}::{name}" for name in names} - self._functions
+        return bool(found - self._left_out) and file not in self._left_out
 
     def _seconds(self, test: str) -> float:
         return self._known.seconds[test]
@@ -119,10 +129,6 @@ class Tests:
 
 def _file(test: str) -> str:
     return test.partition("::")[0]
-
-
-def _slow_lines() -> list[str]:
-    return (ROOT / "tests/slow.txt").read_text(encoding="utf-8").splitlines()
 
 
 def drawn(seed: int, count: int, only: Sequence[str], tests: Tests) -> list[DrawnFault]:

@@ -1,5 +1,6 @@
 """Random changes of single replicas: drawn parameters of every kind of block."""
 
+from fractions import Fraction
 from typing import Any
 
 from dice import Dice
@@ -59,6 +60,60 @@ def keys_of(tables: dict[str, Any]) -> dict[str, tuple[Any, ...]]:
             for key in [key for key in found if f"{name}.intruders[0]" in key]:
                 del found[key]
     return found
+
+
+#: Ends of keys that may change while a run lasts, beside those of wires and processors.
+_MAY_CHANGE = (
+    "scan_rate_hz", "offset_s", "jitter_s", "rate_error_ppm", "enabled", "azimuth_deg",
+    "azimuth_resolution_deg", "misalignment_deg", "range_km", "range_resolution_m", "losses_db",
+    "minimum_range_m", "false_alarm_probability", "threshold", "false_alarms_per_frame",
+    "angle_gate_deg", "range_gate_m", "turn_deg", "pause_s", "rain_rate_mm_h", "latency_s",
+)  # fmt: skip
+_OF_WIRES = {"delay_s": (0, 0.2, "1/3"), "jitter_s": (0, 0.1), "drop_probability": (0, 0.5)}
+
+
+def timed(tables: dict[str, Any], dice: Dice) -> list[dict[str, Any]]:
+    """Return what changes in a scene while it runs: one to four keys, once, twice or for a while.
+
+    Parameters
+    ----------
+    tables : dict
+        The scene.
+    dice : Dice
+        Receives ``changes KEY`` as features.
+    """
+    keys = {
+        key: values
+        for key, values in keys_of(tables).items()
+        if key.rpartition(".")[2] in _MAY_CHANGE
+    }
+    for number in range(len(tables["wires"])):
+        keys |= {f"wires[{number}].{key}": values for key, values in _OF_WIRES.items()}
+    for name in tables.get("processors", {}):
+        keys[f"processors.{name}.service_s"] = (0.002, "1/9")
+    sensors = [key for key in keys if key.endswith(".enabled")]
+    # Sensors most often: of the many wires each is asked for a little.
+    weights = [4 if key.startswith(("blocks", "weather")) else 1 for key in sorted(keys)]
+    drawn = dict.fromkeys(dice.choices(sorted(keys), weights, k=dice.randint(1, 4)))
+    if sensors and dice.chance(0.5):
+        drawn[dice.choice(sensors)] = None
+    ends = float(Fraction(tables["duration_s"]))
+    changes = []
+    for key in drawn:
+        dice.features.add(f"changes {key.rpartition('.')[2]}")
+        first, last = sorted((dice.near(0, ends, 2), dice.near(0, ends, 2)))
+        if dice.chance(0.3):
+            first = float(int(first))  # where clocks scan
+        if first >= ends:
+            continue
+        values = dice.choice(keys[key]), dice.choice(keys[key])
+        if dice.chance(0.5, "changes for a while") and first < last:
+            changes.append({"from_s": first, "to_s": last, "set": {key: values[0]}})
+            continue
+        changes.append({"at_s": first, "set": {key: values[0]}})
+        if first < last < ends and dice.chance(0.4, "changes twice"):
+            changes.append({"at_s": last, "set": {key: values[1]}})
+    return changes
 
 
 def replicas(tables: dict[str, Any], dice: Dice) -> list[Replica]:

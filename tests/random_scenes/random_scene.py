@@ -13,6 +13,7 @@ from typing import Any
 import random_blocks
 import random_flights
 from dice import Dice
+from random_changes import timed
 
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
@@ -69,11 +70,22 @@ class Case:
         dice.shuffle(blocks)
         dice.shuffle(wires)
         tables = {**self.tables, "wires": wires, "blocks": dict(blocks)}
+        place = {id(wire): number for number, wire in enumerate(wires)}
+        now = {f"wires[{n}]": f"wires[{place[id(w)]}]" for n, w in enumerate(self.tables["wires"])}
+        changes = []
+        for change in tables.pop("changes", ()):
+            ((key, value),) = change["set"].items()
+            of, dot, rest = key.partition(".")
+            changes.append({**change, "set": {f"{now.get(of, of)}{dot}{rest}": value}})
+        if changes:
+            tables["changes"] = changes
         return replace(self, tables=tables)
 
 
-def legal_case(seed: int, folder: Path) -> Case:
+def legal_case(seed: int, folder: Path, changing: float = 0.2) -> Case:
     """Return the scene of a seed: the first of those drawn that is legal, written to a folder.
+
+    In a share of all scenes, `changing`, something changes while they run.
 
     Raises
     ------
@@ -83,6 +95,10 @@ def legal_case(seed: int, folder: Path) -> Case:
     refused: list[str] = []
     for attempt in range(_MOST_ATTEMPTS):
         case = _Maker(Dice(1000 * seed + attempt)).case(seed)
+        apart = Dice(11 * seed + 5 + attempt)  # scenes in which nothing changes stay what they were
+        if apart.chance(changing, "changes") and (changes := timed(case.tables, apart)):
+            case.tables["changes"] = changes
+            case.features |= apart.features
         try:
             Simulation(case.load(folder))
         except SceneError as error:

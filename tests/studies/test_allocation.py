@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dsa_des.arrays.types import FloatArray
-from dsa_des.results.ratio import FORESEEN_COST, paired_ratio, taken_over
+from dsa_des.results.ratio import FORESEEN_COST, paired_ratio, sampled_share, taken_over
 from dsa_des.studies.allocation import (
     FIRST_LEAST,
     LEAST,
@@ -294,6 +294,30 @@ def test_an_event_that_was_seen_often_is_predicted_and_the_sure_are_flown_less()
     both = np.array([[0.5, 0.9], [0.5, 0.9]])
     open_ = left_open(both, np.array([True, False]))
     assert open_ == pytest.approx(np.array([[0.25, 0.09], [0.5, 0.9]]))
+
+
+def test_a_share_of_a_sample_is_the_surer_of_two_and_never_above_1() -> None:
+    rng = np.random.default_rng(8)
+    whole, chance = np.ones(400), np.repeat([0.05, 0.8], 200)
+    s = drawn(chance, rng.uniform(size=400).tolist())[1]
+    weight = np.ones(400)
+    every = sampled_share(whole, whole, weight, s, predicted=None)
+    # One that nobody saw stands for twenty: 3.69 of these may be missing of 400.
+    assert every.ratio == every.interval[1] == 1.0
+    assert every.interval[0] == pytest.approx(1.0 - 3.69 * 20 / 400, abs=0.01)
+    part = (rng.uniform(size=400) < 0.7).astype(float)
+    large = sampled_share(whole, part, weight, s, predicted=None)
+    assert large.ratio == pytest.approx((s * part).sum() / s.sum())  # Hájek's
+    rare = np.zeros(400)
+    rare[-2:] = (s[-2:] > 0.0) | (np.arange(2) > 0)
+    seldom = sampled_share(whole, rare, weight, s, predicted=None)
+    plain = paired_ratio(whole, rare, stands_for=s)
+    assert seldom.standard_error <= plain.standard_error
+    assert seldom.flown == plain.flown == np.count_nonzero(s)
+    for one in (large, seldom):
+        assert one.interval[0] <= one.ratio <= one.interval[1] <= 1.0
+    # Where nothing can be told no more is said to have been flown, nor less.
+    assert paired_ratio([0, 0], [0, np.nan], stands_for=[2, 0]).flown == 1
 
 
 def test_what_failed_runs_stood_for_is_shared_by_those_flown_of_their_cell() -> None:

@@ -260,9 +260,14 @@ def test_planes_of_a_host_have_no_equipage(key):
 def test_range_rates_are_offered_by_whoever_reports_them(kind):
     """An aircraft broadcasts its velocity; a transponder's reply has none."""
     offer = Simulation(dsa_des.load_scene(scene(kind))).components["sensor"].offer("detections")
-    rates = [row["range_rate_m_s"] for row in rows(run(scene(kind)), scan=2)]
+    found = rows(run(scene(kind)), scan=2)
+    rates = [row["range_rate_m_s"] for row in found]
     assert rates and offer.measures_range_rate is (kind == "surveillance.ads_b")
     assert {rate is not None for rate in rates} == {offer.measures_range_rate}
+    for row in found if offer.measures_range_rate else ():
+        target = next(one for one in TARGETS if one["name"] == row["target"])
+        near, far = (np.linalg.norm(crooked.body(target, 2.0 + off_s)) for off_s in (-0.01, 0.01))
+        assert row["range_rate_m_s"] == pytest.approx((far - near) / 0.02, abs=0.01)
 
 
 def test_what_an_interrogator_offers_is_what_its_answers_have():
@@ -277,6 +282,10 @@ def test_what_an_interrogator_offers_is_what_its_answers_have():
         assert offer.tells is (measurement != "exact")
         assert set(offer.lasting) == (set() if measurement == "exact" else {"range", "elevation"})
         assert bool(offer.told_errors) is (measurement != "exact")
+    # Far ones are asked every fifth time.
+    found = scene("surveillance.active", far_every=5)
+    offer = Simulation(dsa_des.load_scene(found)).components["sensor"].offer("detections")
+    assert offer.promises == ((np.inf, 5.0),)
 
 
 @pytest.mark.parametrize(

@@ -137,3 +137,18 @@ def test_what_the_old_name_builds_is_the_same_block():
     ]
     old, new = (tables_of(scene)[1]["tracks"] for scene in scenes)
     assert isinstance(old, pa.Table) and old.equals(new)
+
+
+@pytest.mark.parametrize(
+    "fusion",
+    [
+        {"type": "fusion.pick_best", "coincidence_s": 0.3},
+        {"type": "fusion.gated", "time_gate_s": 0.3},
+    ],
+)
+def test_what_counts_once_does_so_in_any_window_and_company(fusion):
+    """Which detections a row was made of before is known from window to window, run by run."""
+    scene = chain(SENSORS, fusion=fusion, tracker={"type": "tracking.ekf"}, duration_s=1.5)
+    loaded = dsa_des.load_scene(scene)
+    assert same_in_any_window(loaded)["state_tracks"].num_rows > 20
+    same_as_alone(replicas_of(loaded, {}, {"blocks.radar.offset_s": 0.05}, {}))

@@ -123,6 +123,24 @@ def test_flown_runs_are_those_of_the_whole_study_and_the_ratio_is_that_of_their_
     assert summary["nmac_nominal"]["value"] == pytest.approx(n.mean())
 
 
+def test_who_turns_into_everybody_is_told_without_shares_above_1(folder: Path) -> None:
+    """All are manoeuvred, most NMACs come where none would be: shares of few that are flown."""
+    scene = SCENE.replace("turn_deg = 60", 'turn_deg = 60, direction = "towards"')
+    (folder / "scene.toml").write_text(scene, encoding="utf-8")
+    found: dict[str, dict[str, Any]] = {}
+    for name, allocate in (("whole", ""), ("part", 'allocate = "nmac_risk_ratio"')):
+        out = study(folder, name, allocate)
+        for table in ("ratios", "summary"):
+            rows_of = pq.read_table(out / f"{table}.parquet").to_pylist()
+            found[f"{table} of {name}"] = {row["result"]: row for row in rows_of}
+    whole, part = (found[f"summary of {name}"] for name in ("whole", "part"))
+    assert 0 < found["ratios of part"]["nmac_risk_ratio"]["flown"] < 60
+    for name in ("manoeuvred", "needless_manoeuvre", "needless_manoeuvre_share"):
+        assert part[name]["low"] <= part[name]["value"] <= part[name]["high"] <= 1.0, name
+    for name in ("manoeuvred", "needless_manoeuvre_share", "nmac_risk_ratio"):
+        assert part[name]["low"] <= whole[name]["value"] <= part[name]["high"], name
+
+
 def test_the_same_bytes_with_other_chunks_and_after_a_stop(folder: Path) -> None:
     allocate = 'allocate = ["nmac_risk_ratio", "well_clear_lost_risk_ratio"]'
     one = rows(study(folder, "one", allocate))

@@ -1,0 +1,103 @@
+"""``[[outages]]``: how often and how long, alone or together, beside other runs."""
+
+import numpy as np
+import pytest
+from covering import covers
+from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
+from test_changes_while_a_run_lasts import change, scans_of, scene
+
+from dsa_des.arrays.run_ticks import RunTicks
+from dsa_des.errors import SceneError
+from dsa_des.scene.block_table import Outage
+from dsa_des.stretches.outages import Outages
+from dsa_des.time.randomness import Streams
+from dsa_des.time.runs import Runs
+
+
+def outage(*blocks, **keys):
+    return {"blocks": [*blocks], "mean_between_s": 8, "mean_repair_s": 4, **keys}
+
+
+def spans_s(outages):
+    """Return when something fails and is back in the first run, in seconds of whole ticks."""
+    return outages._edges[0].tick.reshape(outages._runs.count, -1)[0].reshape(-1, 2)
+
+
+def test_times_between_failures_and_out_of_work_are_those_asked_for():
+    runs = Runs(40, 100_000)
+    failing = Outage(blocks=["radar"], mean_between_s=50, mean_repair_s=7, restart_s=3)
+    outages = Outages([failing], Streams(range(40)), runs, 10)
+    edges = [of[of < 100_000] / 10 for of in outages._edges[0].tick.reshape(40, -1)]
+    out = np.concatenate([(of[1::2] - of[: len(of) // 2 * 2 : 2]) for of in edges])
+    up = np.concatenate([of[2::2] - of[1::2][: len(of[2::2])] for of in edges])
+    many = len(out)
+    assert many == pytest.approx(40 * 10_000 / 60, rel=0.05)
+    assert out.min() >= 3
+    assert (out - 3).mean() == pytest.approx(7, abs=4 * 7 / many**0.5)
+    assert up.mean() == pytest.approx(50, abs=4 * 50 / many**0.5)
+    # Exponential times: a share of 1/e lasts longer than the mean.
+    assert (up > 50).mean() == pytest.approx(np.exp(-1), abs=4 * 0.5 / many**0.5)
+    instants = RunTicks.of_run(0, np.arange(0, 100_000, 7))
+    down = ~outages.up(instants)
+    inside = np.zeros(len(down), dtype=bool)
+    for first, last in spans_s(outages):
+        inside |= (instants.tick >= first) & (instants.tick < last)
+    assert (down == inside).all()
+    assert down.mean() == pytest.approx(10 / 60, abs=0.03)
+
+
+@covers("outages", of=("[scene]",))
+@covers("blocks", "mean_between_s", "mean_repair_s", of=("[outages]",))
+def test_a_block_that_is_out_does_not_scan_in_any_window_and_beside_other_runs():
+    failing = scene(change("blocks.radar.scan_rate_hz", 4), tracks=True,
+                    outages=[outage("radar"), outage("tracker", restart_s=1)])  # fmt: skip
+    whole = same_in_any_window(failing, windows=(1, 5))
+    same_as_alone(replicas_of(failing, {}, {}, {}), window=30)
+    _, never = tables_of(scene(change("blocks.radar.scan_rate_hz", 4), tracks=True))
+    all_scans, scans = scans_of(never["scans"]), scans_of(whole["scans"])
+    assert 0.2 * len(all_scans) < len(scans) < 0.95 * len(all_scans)
+    assert set(scans) < set(all_scans)
+    # What it is as long as it works is the same as if it never failed.
+    kept = [t in set(scans) for t in all_scans]
+    assert never["scans"].filter(kept).equals(whole["scans"])
+
+
+@covers("restart_s", of=("[outages]",))
+def test_a_restart_takes_its_time():
+    def missing(**keys):
+        simulation, _ = tables_of(scene(outages=[outage("radar", **keys)]))
+        return simulation.timeline.outages("radar")
+
+    spans, longer = (spans_s(missing(**keys)) / 1e9 for keys in ({}, {"restart_s": 1.5}))
+    lasts, last_longer = (of[:, 1] - of[:, 0] for of in (spans[:2], longer[:2]))
+    assert last_longer == pytest.approx(lasts + 1.5)
+    assert longer[1, 0] - longer[0, 1] == pytest.approx(spans[1, 0] - spans[0, 1])
+
+
+@covers("name", of=("[outages]",))
+def test_what_fails_together_is_out_together_and_draws_by_its_name():
+    bus = scene(tracks=True, outages=[outage("radar", "tracker", name="bus")])
+    simulation, _ = tables_of(bus)
+    radar, tracker = (spans_s(simulation.timeline.outages(n)) for n in ("radar", "tracker"))
+    assert (radar == tracker).all()
+    other, _ = tables_of(scene(outages=[outage("radar", name="other")]))
+    assert not np.array_equal(spans_s(other.timeline.outages("radar")), radar)
+    said = simulation.timeline.outages("radar").undone()["it is out, counted in seconds"]
+    out_s = sum(np.minimum(last, 40e9) - np.minimum(first, 40e9) for first, last in radar) / 1e9
+    assert said.tolist() == [[round(out_s)], [40]]
+
+
+def test_wrong_outages_are_said():
+    for entry, said in (
+        (outage("rader"), "did you mean 'radar'?"),
+        (outage(), "blocks"),
+        (outage("radar", "radar"), "each stands there once"),
+        (outage("radar", mean_between_s=0), "greater than 0"),
+        (outage("radar", mean_between_s=1e-5), "at most 100,000 failures"),
+        (outage("radar", every_s=3), "every_s"),
+    ):
+        with pytest.raises(SceneError) as wrong:
+            scene(outages=[entry])
+        assert said in str(wrong.value)
+    with pytest.raises(SceneError, match="give each a name of its own"):
+        scene(outages=[outage("radar"), outage("radar")])
