@@ -99,7 +99,7 @@ def test_a_pair_is_as_far_apart_for_the_one_as_for_the_other(scene):
     assert abs(own["slowc_percent"] - ours["slowc_percent"]) > 1.0
 
 
-@pytest.mark.parametrize("metric", ["tracking", "track_errors"])
+@pytest.mark.parametrize("metric", ["tracking", "track_errors_by_range"])
 def test_tracks_of_other_platforms_are_not_measured_by_the_ownship(metric):
     filtered = {"type": "tracking.ekf", "acceleration_intensity_m2_s3": 0.2}
     how = {"tracker": filtered, "duration_s": 10}
