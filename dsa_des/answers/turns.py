@@ -93,7 +93,7 @@ def run_in_turns(
     `begun` is told how long the scene as it is took in the first turn; `after` is told after each
     turn how many are done, and returns the models to go on with. `turn_times` is filled on the way.
     """
-    models = len(study.axes[-1].labels)
+    models, parts = len(study.axes[-1].labels), folder.destination
 
     def chunks(turn: int, some: Sequence[int]) -> Iterator[Chunk]:
         for model in some:
@@ -101,17 +101,19 @@ def run_in_turns(
             yield Chunk(f"part-{turn:03d}-{model:06d}", runs)
 
     def run(turn: int, some: Sequence[int]) -> None:
-        for done in executor.run(study, list(chunks(turn, some))):
-            folder.write_part(done.name, done.content)
+        for done in executor.run(study, parts, list(chunks(turn, some))):
+            if done.content:  # a chunk that was cut, as its process died
+                parts.write(done.name, done.content)
             key = turn, int(done.name.rpartition("-")[2])
             turn_times.cpu_s[key], turn_times.runs[key] = done.cpu_s, done.runs
 
     # What a process does once, imports and compiled code, is nobody's time: all run one run first.
     cell, start, _ = batches[0][0]
     warm = [
-        Chunk(f"part-000-{k:06d}", ((cell * models, start, start + 1),)) for k in range(workers)
+        Chunk(f"part-000-{k:06d}", ((cell * models, start, start + 1),), whole=False)
+        for k in range(workers)
     ]
-    for _ in executor.run(study, warm):
+    for _ in executor.run(study, parts, warm):
         pass
     left: Sequence[int] = range(models)
     for turn in range(len(batches)):

@@ -19,7 +19,7 @@ from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.record.run_folder import write_run_json
-from dsa_des.results.folder import StudyFolder
+from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.record import Result
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.scene.examples import chosen_file
@@ -190,6 +190,8 @@ class AnswerOfStudy:
             if not self.turn_times.runs:
                 raise
             return True
+        except NotWritten as error:
+            raise UsageError(f"{folder.path}: cannot be written: {error}") from error
         finally:
             executor.close()
             folder.close()

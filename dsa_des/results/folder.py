@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -29,6 +30,37 @@ LOCK = ".lock"
 _PART = re.compile(r"part-(\d{3,})-\d{6,}\.parquet")
 _MOST_JSON_BYTES = 256 * 2**20
 _Head = TypeVar("_Head", bound=StudyHead)
+
+
+class NotWritten(Exception):
+    """A part cannot be written; the text says why."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Where the parts of a study go, and whose they are: all that who writes one need know."""
+
+    folder: Path
+    study_sha256: str
+
+    def check(self) -> None:
+        """Raise NotWritten where this process does not find the study in its folder."""
+        try:
+            there = StudyFolder(self.folder).head.study_sha256
+        except UsageError as error:
+            raise NotWritten(
+                f"{error}; who runs a study writes into its folder, by this name"
+            ) from None
+        if there != self.study_sha256:
+            raise NotWritten(f"{self.folder}: holds another study by now")
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a part as a whole, sealed as one of the study, whoever else writes it too."""
+        path = self.folder / PARTS / f"{name}.parquet"
+        try:
+            write_file(path, sealed(content, f"{self.study_sha256} {name}"), to_disk=True)
+        except OSError as error:
+            raise NotWritten(error.strerror or str(error)) from None
 
 
 class StudyFolder:
@@ -103,7 +135,7 @@ class StudyFolder:
             )
         self._record = StudyRecord.model_validate_json(text)
         if known:
-            head = self._read(StudyHead)
+            head = self.head
             if head.study_sha256 != self._record.study_sha256:
                 raise UsageError(
                     f"{self.path}: holds another study or another version of it "
@@ -125,6 +157,11 @@ class StudyFolder:
                 if ours.fullmatch(left.name):
                     with suppress(OSError):
                         left.unlink()
+
+    @property
+    def head(self) -> StudyHead:
+        """Which study is there."""
+        return self._read(StudyHead)
 
     @property
     def record(self) -> StudyRecord:
@@ -196,10 +233,10 @@ class StudyFolder:
             parts.append({} if table is None else undone_of(table))
         return added(parts)
 
-    def write_part(self, name: str, content: bytes) -> None:
-        """Write a part as a whole, sealed as one of this study."""
-        path = self.parts / f"{name}.parquet"
-        write_file(path, sealed(content, self._owner(name)), to_disk=True)
+    @property
+    def destination(self) -> Parts:
+        """Where any process may write parts of this study."""
+        return Parts(self.path.resolve(), self.record.study_sha256)
 
     def remove_part(self, name: str) -> None:
         """Remove a part that no longer belongs to the study."""

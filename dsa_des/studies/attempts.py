@@ -163,4 +163,5 @@ def halves(chunk: Chunk) -> tuple[Chunk, Chunk]:
         left -= cut - start
         first += [(cell, start, cut)] * (start < cut)
         second += [(cell, cut, end)] * (cut < end)
-    return replace(chunk, runs=tuple(first)), replace(chunk, runs=tuple(second))
+    pieces = (replace(chunk, runs=tuple(runs), whole=False) for runs in (first, second))
+    return next(pieces), next(pieces)

@@ -54,7 +54,7 @@ _OBJECTS_AT_ONCE = 50_000
 
 @dataclass(frozen=True)
 class Done:
-    """The result of a chunk: the bytes of its part, and how many runs it holds.
+    """The result of a chunk: the bytes of its part, until they are written, and its runs.
 
     `failed` of them gave no result, and of those `crashed` because their process died.
     """

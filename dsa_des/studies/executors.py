@@ -1,7 +1,8 @@
 """Executors of a study's chunks: this process, a pool of processes, or a Dask cluster.
 
-An executor gives results as they come, in any order. A chunk's rows do not depend on
-its worker, so neither do the results. Pieces whose process dies: see `attempts.py`.
+A chunk's part is written by the process that ran it (`run_and_write`), and what it came to goes to
+whoever asked, as it comes, in any order. A chunk's rows do not depend on its worker, so neither do
+the results, and it does no harm if one is written twice. Pieces whose process dies: `attempts.py`.
 """
 
 import multiprocessing
@@ -14,6 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
@@ -21,6 +23,7 @@ from typing import Any, Protocol
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import is_ours
 from dsa_des.errors import UsageError
+from dsa_des.results.folder import Parts
 from dsa_des.studies.attempts import Attempts, Piece, run_together
 from dsa_des.studies.chunk import Done, run_chunks
 from dsa_des.studies.study import Chunk, Study
@@ -36,20 +39,34 @@ _HOME = str(Path(__file__).parents[2])
 class Executor(Protocol):
     """Something that runs chunks."""
 
-    def run(self, study: Study, chunks: Iterable[Chunk]) -> Iterator[Done]:
-        """Run all chunks and give each result when it is there."""
+    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[Done]:
+        """Run all chunks, have their parts written, and give what each came to when it is there.
+
+        One that is no whole part, or was cut on the way, comes with its rows and is not written.
+        """
 
     def close(self) -> None:
         """Stop all workers."""
 
 
+def run_and_write(study: Study, parts: Parts, chunks: Sequence[Chunk]) -> list[Done]:
+    """Run chunks together and write the parts of those that are whole; only others keep rows."""
+    parts.check()
+    result = run_chunks(study, chunks)
+    for k, chunk in enumerate(chunks):
+        if chunk.whole:
+            parts.write(result[k].name, result[k].content)
+            result[k] = replace(result[k], content=b"")
+    return result
+
+
 class Serial:
     """Runs chunks one after the other in this process."""
 
-    def run(self, study: Study, chunks: Iterable[Chunk]) -> Iterator[Done]:
+    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[Done]:
         """Run all chunks in their order."""
         for some in run_together(study, list(chunks), 1):
-            yield from run_chunks(study, some)
+            yield from run_and_write(study, parts, some)
 
     def close(self) -> None:
         """Nothing to do."""
@@ -66,7 +83,7 @@ class Local:
         self._count = workers
         self._workers: list[_Worker] = []
 
-    def run(self, study: Study, chunks: Iterable[Chunk]) -> Iterator[Done]:
+    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[Done]:
         """Run all chunks; two pieces per worker are under way at a time."""
         attempts = Attempts(study, run_together(study, list(chunks), self._count))
         if not self._workers or any(w.study is not study or len(w) for w in self._workers):
@@ -76,7 +93,7 @@ class Local:
             for depth in range(1, _AHEAD + 1):  # each worker has something before any has more
                 for worker in self._workers:
                     if len(worker) < depth and (piece := attempts.next()) is not None:
-                        worker.submit(piece)
+                        worker.submit(piece, parts)
             running = [future for worker in self._workers for future in worker.futures()]
             if not running:
                 return
@@ -106,13 +123,13 @@ class _Worker:
         """What is under way."""
         return [future for future, _ in self._given]
 
-    def submit(self, piece: Piece) -> None:
+    def submit(self, piece: Piece, parts: Parts) -> None:
         """Run a piece after those that were given before."""
         try:
             with safe_import_path():
                 if self._pool is None:
                     self._pool = _new_pool(self.study)
-                future = self._pool.submit(_work, piece.chunks)
+                future = self._pool.submit(_work, parts, piece.chunks)
         except BrokenProcessPool as error:  # it died since we looked
             future = Future()
             future.set_exception(error)
@@ -222,9 +239,9 @@ def _start_worker(study: Study) -> None:
         threading.Thread(target=follow, daemon=True).start()
 
 
-def _work(chunks: Sequence[Chunk]) -> list[Done]:
+def _work(parts: Parts, chunks: Sequence[Chunk]) -> list[Done]:
     try:
-        return run_chunks(_studied[0], chunks)
+        return run_and_write(_studied[0], parts, chunks)
     except KeyboardInterrupt:  # raised by a block: ctrl-C does not come here
         os._exit(1)
 
@@ -238,8 +255,8 @@ _START_DASK = (
 class Dask:
     """Runs chunks on a Dask cluster that is already there.
 
-    Its workers need this package, and the scene's files under the same names; results travel back
-    through the scheduler.
+    Its workers need this package, and the scene's files and the study's folder under the same
+    names: what goes through the scheduler are chunks, and how many runs each came to.
     """
 
     def __init__(self, scheduler: str) -> None:
@@ -264,7 +281,7 @@ class Dask:
                 f"{_CONNECT_TIMEOUT_S} s ({type(error).__name__}); {_START_DASK}"
             ) from error
 
-    def run(self, study: Study, chunks: Iterable[Chunk]) -> Iterator[Done]:
+    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[Done]:
         """Run all chunks; Dask itself first runs again what a dead worker was at."""
         from distributed import as_completed
         from distributed.scheduler import KilledWorker
@@ -277,7 +294,7 @@ class Dask:
 
         def submit() -> None:
             while len(given) < most and (piece := attempts.next()) is not None:
-                future = self._client.submit(run_chunks, study, piece.chunks, pure=False)
+                future = self._client.submit(run_and_write, study, parts, piece.chunks, pure=False)
                 given[future.key] = piece
                 running.add(future)
 

@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from dsa_des.errors import SceneError, UsageError
 from dsa_des.replicas.changed_scene import scene_of
 from dsa_des.replicas.replicas import why_apart
-from dsa_des.results.folder import StudyFolder
+from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.record import CRASHED
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.results.tables import Expected, Tables
@@ -112,20 +112,21 @@ def _run_round(
         progress.runs += there.runs - there.crashed
         if there.crashed:
             crashed = np.asarray(pc.equal(rows["status"], CRASHED))
-            missing.append(replace(chunk, runs=_runs_of(rows.filter(crashed))))
+            missing.append(replace(chunk, runs=_runs_of(rows.filter(crashed)), whole=False))
             if there.crashed < there.runs:
                 kept[chunk.name] = done_of(chunk.name, rows.filter(~crashed), undone)
     report(progress)
-    for done in executor.run(study, missing):
-        whole = joined(done.name, [kept[done.name], done]) if done.name in kept else done
-        try:
-            folder.write_part(whole.name, whole.content)
-        except OSError as error:
-            raise Stopped(f"results cannot be written: {error.strerror or error}") from error
-        progress.runs += done.runs
-        progress.failed += done.failed
-        progress.crashed += done.crashed
-        report(progress)
+    try:
+        for done in executor.run(study, folder.destination, missing):
+            whole = joined(done.name, [kept[done.name], done]) if done.name in kept else done
+            if whole.content:
+                folder.destination.write(whole.name, whole.content)
+            progress.runs += done.runs
+            progress.failed += done.failed
+            progress.crashed += done.crashed
+            report(progress)
+    except NotWritten as error:
+        raise Stopped(f"results cannot be written: {error}") from error
 
 
 def _round_of(name: str) -> int:

@@ -66,6 +66,8 @@ class Chunk:
     runs: tuple[tuple[int, int, int], ...]
     #: Of cells of which a sample of the runs is flown.
     plans: Mapping[int, Allocation] = field(default_factory=dict)
+    #: Whether these are all runs of its part; a piece is put together with the others.
+    whole: bool = True
 
     def __len__(self) -> int:
         return sum(end - start for _, start, end in self.runs)

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import dsa_des
 from dsa_des.cli import main
+from dsa_des.results import folder as study_folder
 from dsa_des.results.folder import StudyFolder
 from tests.studies.conftest import small
 
@@ -51,14 +52,14 @@ def shell(command: str, home: Path) -> subprocess.CompletedProcess[str]:
 
 def stopping(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     """Let the second part meet an error."""
-    write = StudyFolder.write_part
+    write = study_folder.write_file
 
-    def fail(self: StudyFolder, name: str, content: bytes) -> None:
-        if name.endswith("1"):
+    def fail(path: Path, content: bytes, **how: bool) -> None:
+        if path.stem.endswith("1"):
             raise error
-        write(self, name, content)
+        write(path, content, **how)
 
-    monkeypatch.setattr(StudyFolder, "write_part", fail)
+    monkeypatch.setattr(study_folder, "write_file", fail)
 
 
 @pytest.mark.parametrize("name", NAMES)

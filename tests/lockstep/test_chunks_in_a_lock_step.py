@@ -1,6 +1,8 @@
 """Chunks are what is written at once; the lock steps that their runs share are another size."""
 
+import gc
 import io
+import tracemalloc
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,8 +17,7 @@ from dsa_des.results.folder import undone_of
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies import attempts
 from dsa_des.studies.attempts import run_together
-from dsa_des.studies.chunk import run_chunk, run_chunks
-from dsa_des.studies.executors import Serial
+from dsa_des.studies.chunk import Done, run_chunk, run_chunks
 from dsa_des.studies.study import Chunk, Study
 from dsa_des.studies.study_file import study_of_tables
 
@@ -31,6 +32,10 @@ def study(per_chunk: int, runs: int = RUNS, **more: Any) -> Study:
     }  # fmt: skip
     scene = read_scene_file(CONFIGS / "benchmark" / "closed_loop_risk.toml")
     return study_of_tables(tables, scene, (), [("duration_s", 4), ("blocks.radar.range_km", 16)])
+
+
+def run_all(one: Study, chunks: Sequence[Chunk]) -> list[Done]:
+    return [done for some in run_together(one, chunks, 1) for done in run_chunks(one, some)]
 
 
 @pytest.fixture
@@ -54,7 +59,7 @@ def test_chunks_of_any_size_share_lock_steps_and_have_the_bytes_of_each_alone(
         of_size = study(per_chunk)
         chunks = list(of_size.chunks(0, [0]))
         del shared[:]
-        parts = list(Serial().run(of_size, chunks))
+        parts = run_all(of_size, chunks)
         assert shared == [RUNS]
         assert [part.content for part in parts] == [run_chunk(of_size, c).content for c in chunks]
         assert [part.runs for part in parts] == [len(chunk) for chunk in chunks]
@@ -69,14 +74,37 @@ def test_chunks_of_any_size_share_lock_steps_and_have_the_bytes_of_each_alone(
 def test_lock_steps_hold_what_memory_does_and_each_about_as_many(
     shared: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(replicas, "_MOST_TOGETHER", 4)
-    whole = list(Serial().run(one := study(RUNS), one.chunks(0, [0])))
+    monkeypatch.setattr(replicas, "_likely_bytes", lambda scene: replicas._MOST_BYTES / 4)
+    whole = run_all(one := study(RUNS), list(one.chunks(0, [0])))
     assert shared == [4, 3, 3]
     del shared[:]
-    parts = list(Serial().run(one := study(2), one.chunks(0, [0])))
+    parts = run_all(one := study(2), list(one.chunks(0, [0])))
     assert shared == [4, 2, 4]
     tables = [pq.read_table(io.BytesIO(part.content)).to_pylist() for part in [*whole, *parts]]
     assert tables[0] == [row for table in tables[1:] for row in table]
+
+
+def test_a_run_holds_about_what_it_is_taken_for() -> None:
+    """Of the benchmark's `risk`, whole: what more runs in a lock step hold more at its peak."""
+    one = study(1, 96, set={"duration_s": 180, "blocks.radar.range_km": 8})
+    scene, peaks = one.scene(0), list[int]()
+    replicas.run_replicas(scene, [one.replica(k) for k in range(2)], wanted={})
+    tracemalloc.start()
+    try:
+        for count in (32, 96):
+            some = [one.replica(k) for k in range(count)]
+            before = tracemalloc.get_traced_memory()[0]
+            tracemalloc.reset_peak()
+            with_flights: Any = replicas.lock_step(replicas.scenes_of(scene, some))
+            tracemalloc.reset_peak()
+            with_flights.run()
+            peaks.append(tracemalloc.get_traced_memory()[1] - before)
+            del with_flights
+            gc.collect()
+    finally:
+        tracemalloc.stop()
+    assert scene.duration_s == 180
+    assert peaks[1] - peaks[0] == pytest.approx(64 * replicas._likely_bytes(scene), rel=0.4)
 
 
 def test_every_worker_has_about_as_much() -> None:

@@ -5,6 +5,7 @@ import resource
 import shlex
 import signal
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -12,9 +13,9 @@ import pytest
 
 from dsa_des.commands.study import finish, run_into
 from dsa_des.errors import UsageError
-from dsa_des.results.folder import StudyFolder
+from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.statistics import wilson
-from dsa_des.studies.executors import Dask
+from dsa_des.studies.executors import Dask, run_and_write
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import Stopped, run_study
 from dsa_des.studies.study_file import read_study
@@ -221,6 +222,20 @@ def test_an_error_of_the_disk_is_told_as_such(small: Path, monkeypatch: pytest.M
     with pytest.raises(Stopped, match="No space left"):
         run_study(study, folder, Serial())
     assert not list(folder.parts.iterdir())
+
+
+def test_who_does_not_find_the_study_writes_nothing(small: Path) -> None:
+    study = read_study("study.toml")
+    folder = StudyFolder(Path("o"))
+    folder.open(description_text(study), resume=False)
+    other, gone = replace(folder.destination, study_sha256="0"), Path("moved").resolve()
+    for parts, why in (
+        (other, "holds another study"),
+        (replace(other, folder=gone), rf"{gone}: is not the folder of a study.*by this name"),
+    ):
+        with pytest.raises(NotWritten, match=why):
+            run_and_write(study, parts, list(study.chunks(0, [0])))
+    assert not list(folder.parts.iterdir()) and not gone.exists()
 
 
 def test_all_runs_open_in_one_line(small: Path) -> None:

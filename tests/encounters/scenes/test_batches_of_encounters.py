@@ -35,7 +35,7 @@ def test_a_chunk_beyond_any_cache_makes_each_encounter_once(
     made: dict[str, Counter[Any]], tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of 1,300 runs in one chunk, 650 of which run together; then the metrics ask again."""
-    monkeypatch.setattr(replicas, "_MOST_TOGETHER", 1024)
+    monkeypatch.setattr(replicas, "_likely_bytes", lambda scene: replicas._MOST_BYTES / 1024)
     scene = chain({"radar": sensor("radar.range_boundary", scan_rate_hz=1)}, duration_s=1)
     (tmp_path / "model.txt").write_text(GAS, encoding="utf-8")
     scene["blocks"]["traffic"] = {

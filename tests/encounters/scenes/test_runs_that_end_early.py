@@ -184,7 +184,7 @@ def test_an_end_is_early_only_if_it_is(tmp_path):
 @pytest.mark.parametrize("rules_s", [(3600.0, 2.0, 5.0, 3600.0, 8.0), (2.0, 3600.0, 3.0)])
 def test_metrics_of_runs_that_end_differently(tmp_path, monkeypatch, rules_s):
     """Runs of a chunk share flights, batches and tables; each is measured as if it were alone."""
-    monkeypatch.setattr(replicas, "_MOST_TOGETHER", 2)
+    monkeypatch.setattr(replicas, "_likely_bytes", lambda scene: replicas._MOST_BYTES / 2)
     wanted = scene([BACK, crooked.ROLLING])
     (tmp_path / "scene.toml").write_text(to_toml(wanted), encoding="utf-8")
     base = load_scene(tmp_path / "scene.toml")
