@@ -5,6 +5,7 @@ They are ``[weather]``, ``[accuracy]``, ``[navigation]`` and ``[terrain]``.
 
 from typing import Annotated, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from components.atmosphere.pressure_altitude import STANDARD_HPA
@@ -223,6 +224,13 @@ class Terrain(Parameters):
         description="Height of the raster's zero above the ellipsoid, m: the geoid's undulation "
         "where altitudes are above the ellipsoid.",
     )
+
+    def ground_m(self, lat_deg: float, lon_deg: float) -> float | None:
+        """Return the height of the ground above the ellipsoid; None where none is known."""
+        if self.raster is None:
+            return self.height_m
+        heights, inside = self.raster.raster.height(np.array([lat_deg]), np.array([lon_deg]))
+        return float(heights[0]) + self.raster_offset_m if inside[0] else None
 
     def without_effect(self) -> list[str]:
         """Say which keys belong to ground that there is not, and where ground is made up."""

@@ -15,6 +15,7 @@ from pydantic import Field
 from components.arguments.units import NAUTICAL_MILE_M
 from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import held
+from components.metrics.separation import refuse_other_platforms
 from components.metrics.true_states import Coverage, position_in_frame, states_in_frame
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Parameters
@@ -64,6 +65,7 @@ class ErrorsByRange(Metric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
+        refuse_other_platforms(scene)
         if any(not 0.0 < r <= 1000.0 for r in self.p.ranges_nmi):
             raise ValueError("ranges_nmi: must lie above 0, at most 1000")
         if len(set(self.p.ranges_nmi)) < len(self.p.ranges_nmi):

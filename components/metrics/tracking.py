@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import COVARIANCE, full_covariance, held
 from components.metrics.rows import is_named
-from components.metrics.separation import traffic_of
+from components.metrics.separation import refuse_other_platforms, traffic_of
 from components.metrics.track_scores import ReportedTracks, TrackTally, innovation_results
 from components.metrics.true_states import Coverage, states_in_frame
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -114,6 +114,7 @@ class Tracking(Metric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
+        refuse_other_platforms(scene)
         known, block = recorded_by(scene, _TABLE), self.p.block
         if block is not None and block not in known:
             raise ValueError(f"block: {block!r} tells no tracks{did_you_mean(block, known)}")

@@ -33,7 +33,7 @@ from components.optical.infrared_area import AREA
 from components.optical.signature import SIGNATURE, DynamicSignature, pixels_of_cells
 from components.optical.weather_effects import DARKNESS, Visibility
 from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
-from components.sensor.look import Cells, CellValues, Look
+from components.sensor.look import Cells, CellValues, Look, values_of
 from components.sensor.parameters import GlintParameters, SensorParameters
 from components.sensor.sensor import CUED_INPUTS, Sensor
 from dsa_des.arrays.types import FloatArray
@@ -291,7 +291,7 @@ class Camera(Sensor):
         """Return the area that shows in each cell with what the scene's effects add to it, m²."""
         area = self.area(cells)
         for added in self._areas:
-            area = area + added(cells)
+            area = area + values_of(self, added, cells)
         return area
 
     def contrast(self, cells: Cells) -> FloatArray:
@@ -310,11 +310,11 @@ class Camera(Sensor):
         )
         contrast = self.contrast(cells)
         for factor in self._contrast_factors:
-            contrast = contrast * factor(cells)
+            contrast = contrast * values_of(self, factor, cells)
         # Eq. 18, by hand: total_signature adds the rate of the line of sight, here an effect.
         signature = self.p.static_weight * pixels * contrast
         for added in self._signatures:
-            signature = signature + added(cells)
+            signature = signature + values_of(self, added, cells)
         signature = signature * self.share(pixels)
         threshold = self._threshold_of(cells)
         noise = self.detector.noise

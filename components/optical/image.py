@@ -23,7 +23,7 @@ from components.optical.picture import (
 from components.optical.sensors import ElectroOptical, ElectroOpticalParameters
 from components.optical.silhouette import union_area
 from components.sensor.ladder_values import measure_cells
-from components.sensor.look import Cells, Look
+from components.sensor.look import Cells, Look, values_of
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.message import Column, columns
@@ -173,7 +173,7 @@ class ImageCamera(ElectroOptical):
             outlines = self._outlines(cells, now)
             contrast = self.contrast(cells)
             for factor in self._contrast_factors:
-                contrast = contrast * factor(cells)
+                contrast = contrast * values_of(self, factor, cells)
             fields["true_column_px"], fields["true_row_px"] = now.column, now.row
             keys = cells.roster.keys_of(cells.target)
             in_frame = self.pinhole.holds(now.column, now.row)

@@ -46,7 +46,7 @@ from components.radar.weather import (
 )
 from components.sensor.acquisition import STEP_S, Acquired, AcquisitionRange, check_speeds
 from components.sensor.cued_looks import refuse_cues
-from components.sensor.look import Cells, CellValues, Look
+from components.sensor.look import Cells, CellValues, Look, values_of
 from components.sensor.marks import RADAR
 from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -327,7 +327,7 @@ class RangeBoundary(Radar):
         detected = np.ones(len(cells), dtype=bool)
         through = np.ones(len(cells))
         for factor in self.snr_factors:
-            through = through * factor(cells)
+            through = through * values_of(self, factor, cells)
         audible = through > 0.0
         lossy = bool((through[audible] != 1.0).any())
         if lossy or self.echoes or not (self.cfar is self.doppler is None):

@@ -28,7 +28,7 @@ from components.radar.rcs import (
 from components.radar.threshold_radar import LinkBudgetRadar
 from components.radar.weather import WEATHER_EFFECTS
 from components.sensor.cued_looks import CUE
-from components.sensor.look import Cells, Look
+from components.sensor.look import Cells, Look, values_of
 from dsa_des.arrays.types import FloatArray
 from dsa_des.time.gauss_markov import LONGEST_S
 
@@ -241,7 +241,7 @@ class SwerlingRadar(LinkBudgetRadar):
         """Return each cell's SNR: the mean one, or that of the scan's sampled RCS."""
         if not self.p.samples_rcs or self._models is steady:
             return super().snr(cells)
-        rcs = self.mean_rcs_m2(cells)
+        rcs = values_of(self, self.mean_rcs_m2, cells)
         keys = cells.roster.keys_of(cells.target)
         for model, chosen in self._models(cells):
             if self._fading is not None and self._lasts(model):

@@ -44,7 +44,7 @@ from components.radar.resolution import OneReportByCell
 from components.radar.timing import LOOK_ENERGY, TimeBudget, time_report
 from components.radar.weather import WEATHER_EFFECTS, BlindRange, gas_left_out, rain_warnings
 from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
-from components.sensor.look import Cells, CellValues, Look
+from components.sensor.look import Cells, CellValues, Look, values_of
 from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook
@@ -145,13 +145,13 @@ class LinkBudgetRadar(Radar):
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's mean SNR (linear), 0 closer than the minimum range (eq. 7-8)."""
-        return self.echo_snr(cells, self.mean_rcs_m2(cells))
+        return self.echo_snr(cells, values_of(self, self.mean_rcs_m2, cells))
 
     def echo_snr(self, cells: Cells, rcs_m2: FloatArray) -> FloatArray:
         """Return each cell's SNR for the given cross-sections, with all losses on the way."""
         snr = self._echo_budget.snr_of_cells(cells.range_m, rcs_m2)
         for factor in self.snr_factors:
-            snr = snr * factor(cells)
+            snr = snr * values_of(self, factor, cells)
         return snr
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

@@ -11,6 +11,7 @@ from components.messages.targets import RelativeTargets
 from dsa_des.arrays.column_values import of_one_value, picked
 from dsa_des.arrays.entries import cells_of
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.block.component import Component
 from dsa_des.block.effect import Hook
 from dsa_des.time.clock import NANOSECONDS, nanosecond_of
 
@@ -237,6 +238,31 @@ class CellValues(Protocol):
 
     def __call__(self, cells: Cells, /) -> FloatArray:
         """Return them, (cells,)."""
+
+
+def values_of(block: Component, built: CellValues, cells: Cells) -> FloatArray:
+    """Return what one of a block's effects gives for its cells; ValueError where that is no such.
+
+    Parameters
+    ----------
+    block : Component
+    built : CellValues
+        What the effect built; it is named by this.
+    cells : Cells
+
+    Returns
+    -------
+    ndarray
+        One number for each cell, or one for all.
+    """
+    values = built(cells)
+    if np.ndim(values) and np.shape(values) != (len(cells),):
+        name = next((n for n, one in block.context.effects.items() if one is built), "?")
+        raise ValueError(
+            f"effect {name!r} gives an array of shape {np.shape(values)}: one number for each of "
+            f"the {len(cells)} cells is needed, or one for all"
+        )
+    return values
 
 
 class Strengthening(Protocol):

@@ -231,9 +231,8 @@ class Active(CooperativeSensor):
             detected[asked] = self._answer(cells, asked, probability[asked], instant_ns)
         answered = np.flatnonzero(detected)
         now = self.reported_altitude_m(cells, answered, cells.alt_m[answered])
-        # An altitude that no code has is not available: such an answer places nobody.
-        detected[answered] = np.isfinite(now)
-        answered, now = answered[np.isfinite(now)], now[np.isfinite(now)]
+        detected[answered] = placed = self.placed(cells, answered, now)
+        answered, now = answered[placed], now[placed]
         extras = unreported(len(cells))
         equipage, craft = cells.roster.equipage, cells.craft[answered]
         extras["address"][answered] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)

@@ -242,8 +242,7 @@ class AdsB(CooperativeSensor):
         detected[reported] = True
         if len(reported):
             self._report(cells, reported, number, sent_ns, extras)
-            # An altitude that no code has is not available, and there is no place without one.
-            placed = np.isfinite(extras["reported_alt_m"][reported])
+            placed = self.placed(cells, reported, extras["reported_alt_m"][reported])
             detected[reported], reported = placed, reported[placed]
             moves[:, reported] = own_velocity(cells, reported)
         signal = {f"own_{axis}": moves[i] for i, axis in enumerate(("north", "east", "down"))}

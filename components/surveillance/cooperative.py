@@ -18,12 +18,19 @@ from components.sensor.marks import COOPERATIVE
 from components.sensor.parameters import SensorParameters
 from components.sensor.sensor import Sensor
 from components.surveillance.reports import CooperativeReports
-from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Output
 from dsa_des.errors import Disagreements
+from dsa_des.record.undone import NO_COUNTS, with_cases
 
 #: Half of the time between positions that a velocity is of; a power of two.
 STEP_S = 1.0 / 64.0
+
+#: What one who is heard lacks where no code has its altitude.
+NO_CODE = (
+    "those that it hears send no altitude (no code has one below -1,200 ft or above 126,700 ft), "
+    "and are not placed"
+)
 
 #: Keys of sensors that measure lines of sight; a report that an aircraft makes has none of them.
 _MEASURED_KEYS = (
@@ -132,6 +139,24 @@ class CooperativeSensor(Sensor):
             return said
         needed = " or ".join(self.hears_of)
         return [*said, f"no target's equipage has {needed}: it hears of nobody"]
+
+    def __init__(self, name: str, parameters: Any, context: Any) -> None:
+        super().__init__(name, parameters, context)
+        self._unplaced = NO_COUNTS
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return how many of those heard sent no altitude, by run, and with it no place."""
+        return {**super().undone(), NO_CODE: self._unplaced}
+
+    def placed(self, cells: Cells, heard: IntArray, altitude_m: FloatArray) -> BoolArray:
+        """Return which of the cells that were heard are placed: one without an altitude is not.
+
+        An altitude that no code has is not available (NaN).
+        """
+        there = np.isfinite(altitude_m)
+        run = cells.run[heard]
+        self._unplaced = with_cases(self._unplaced, run[~there], run)
+        return there
 
     @cached_property
     def _reach_from_body(self) -> Reach:

@@ -17,6 +17,7 @@ from components.association.jpda import marginals
 from components.estimation.batched import is_everything, log_determinant, selected
 from components.estimation.estimator import Estimates, innovation_squared
 from components.estimation.frame import SensorPose
+from components.estimation.iterated import iterate
 from components.estimation.modified_polar import (
     moved_in_polar,
     ranged_in_polar,
@@ -241,18 +242,24 @@ def corrected(
 ) -> None:
     """Bring corrections of tracks that no Gaussian along straight axes describes right, in place.
 
-    Those of angle-only tracks are brought into modified polar coordinates. What coarse bearings
+    Those of angle-only tracks are brought into modified polar coordinates, and those that went far
+    along a tangent of a precise measurement are repeated. What coarse bearings
     leave of a target is an arc: there corrections turn it, but a report of where it is, whose
     errors lie along fixed axes, begins it anew if it is bent. `estimates` are those of the tracks
     `track` of the predicted ones after the pairs `pair`.
     """
     part, pose = pairs.tracks, pairs.pose
     angle_only = (~part.ranged[track]).nonzero()[0]
-    if one.own_m_s is not None:
+    straight = part.ranged[track]
+    if one.own_m_s is None:
+        iterate_far(pairs, track, one, pair, estimates, np.flatnonzero(straight))
+    else:
         own_m_s, batch, entry = one.own_m_s[:, pair], pairs.batch, one.detection[pair]
         known = np.isnan(own_m_s[0]) & ~np.isnan(part.own_m_s[0, track])
         reports = batch.code[entry] & TELLS > 0
         own_m_s = np.where(known & ~reports, part.own_m_s[:, track], own_m_s)
+        straight = straight & np.isnan(own_m_s[0])
+        iterate_far(pairs, track, one, pair, estimates, np.flatnonzero(straight))
         turn_coarse(part, track, own_m_s, pose, estimates)
         anew = np.flatnonzero(known & reports)
         anew = anew[is_bent(part.take(track[anew]), pose.take(track[anew]))]
@@ -278,6 +285,31 @@ def corrected(
             range_m, variance_m2 = (values[pair[angle_only]] for values in one.ranges)
             moved = ranged_in_polar(*moved, range_m, variance_m2, sensor_m)
         state[:, angle_only], covariance[:, :, angle_only] = moved
+
+
+def iterate_far(
+    pairs: Candidates,
+    track: IntArray,
+    one: GatedPairs,
+    pair: IntArray,
+    estimates: Estimates,
+    which: IntArray,
+) -> None:
+    """Repeat corrections `which` of those of `corrected` that went too far, in place."""
+    if len(which) == 0:
+        return
+    of, mine, pose = track[which], pair[which], pairs.pose.take(track[which])
+    measured, part = one.measured, pairs.tracks
+    for m, slopes in enumerate(measured.learning or measured.innovations):
+        # What sigma points say is no slope, and errors that states carry are judged by themselves.
+        if slopes.spread.ndim > 2 or slopes.considered is not None or slopes.shared is not None:
+            return
+        after = selected(estimates.states[m], which), selected(estimates.covariances[m], which)
+        before = selected(part.states()[m], of), selected(part.covariances()[m], of)
+        iterate(
+            one.kind, pose, before, after, slopes.take(mine), selected(measured.residuals[m], mine)
+        )
+        estimates.states[m][:, which], estimates.covariances[m][:, :, which] = after
 
 
 def turn_coarse(

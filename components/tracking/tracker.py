@@ -30,7 +30,11 @@ from components.tracking.out_of_sequence import (
     warning,
 )
 from components.tracking.promises import ACTS_EVERY_S, Silence
-from components.tracking.reported_errors import reported_errors, unknown_latency
+from components.tracking.reported_errors import (
+    coarse_bearings,
+    reported_errors,
+    unknown_latency,
+)
 from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
 from components.tracking.scans import LookBatch, Scans, scans_of, when_made
 from components.tracking.step import late_step, step
@@ -166,7 +170,7 @@ class Tracker(Component):
                 )
         if not self._estimator.errors:
             result += unknown_latency(offers)
-        return super().warnings() + result
+        return super().warnings() + result + coarse_bearings(offers)
 
     def offer(self, port: str) -> Any:
         """Hand on what the sensors say of themselves; with ranges where directions give them."""

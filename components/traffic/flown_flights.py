@@ -39,7 +39,7 @@ class FlownFlights:
     those that may be steered or looked from: the ownship (-1) first, and targets by their index,
     one flight for each run. For other instants than those of rows, targets are there while the
     `intervals` of who looks say that they may be near, and positions are those of the last
-    publication at `rates_hz` (runs,).
+    publication at `rates_hz` (runs,). Nobody sees the targets that are `unseen`.
     """
 
     platforms: Mapping[int, SteeredFleet]
@@ -47,6 +47,7 @@ class FlownFlights:
     crabbing: Sequence[Any] = ()
     intervals: Mapping[int, NearIntervals] = field(default_factory=dict)
     rates_hz: FloatArray | None = None
+    unseen: tuple[int, ...] = ()
 
     @property
     def own(self) -> SteeredFleet:
@@ -164,6 +165,10 @@ class FlownFlights:
             for part, new in zip(values, own.arrays(), strict=True):
                 part[mine] = new
             others = TrajectoryState(*values)
+        if self.unseen:
+            hidden = np.isin(np.broadcast_to(columns, shape).reshape(-1), self.unseen)
+            hidden &= np.broadcast_to(columns, shape).reshape(-1) != viewer
+            others = replace(others, present=others.present & ~hidden)
         if viewer in self.intervals:
             near = self.intervals[viewer].holds(target, times, times)
             others = replace(others, present=others.present & near)

@@ -17,7 +17,7 @@ from components.geometry import enu_to_geodetic
 from components.traffic.flown_flights import FlightsOfRuns
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
-from components.traffic.wires import OverheadWire
+from components.traffic.wires import NO_AREAS, OverheadWire
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters
 
@@ -93,6 +93,68 @@ class Intruder(Flight, Aircraft):
     end_time_s: float | None = Field(default=None, ge=0, description="When it leaves, s.")
 
 
+class Site(Parameters):
+    """A place on the ground that may carry blocks; nobody sees it."""
+
+    name: str = Field(min_length=1, description="Name.")
+    lat_deg: float | None = Field(default=None, ge=-90, le=90, description="Latitude, deg.")
+    lon_deg: float | None = Field(default=None, description="Longitude, deg.")
+    east_m: float | None = Field(default=None, description="East of the ownship's start, m.")
+    north_m: float | None = Field(default=None, description="North of the ownship's start, m.")
+    alt_m: float | None = Field(default=None, description="Height above the ellipsoid, m.")
+    above_ground_m: float | None = Field(
+        default=None, gt=0, description="Height above the ground of [terrain], m."
+    )
+    yaw_deg: float = Field(default=0.0, ge=-360, le=360, description="Where its axis points, deg.")
+    pitch_deg: float = Field(default=0.0, ge=-90, le=90, description="How far that is up, deg.")
+    roll_deg: float = Field(default=0.0, ge=-360, le=360, description="Turn about that axis, deg.")
+
+    def at_rest(self, own: Position, terrain: Any) -> "Intruder":
+        """Return it as an aircraft that stands; offsets count from the ownship's start."""
+        place, offset = (self.lat_deg, self.lon_deg), (self.east_m, self.north_m)
+        given, other = (offset, place) if place == (None, None) else (place, offset)
+        if None in given or other != (None, None):
+            raise ValueError(
+                f"site {self.name!r}: its place must be given as lat_deg and lon_deg, or as east_m "
+                "and north_m from the ownship's start"
+            )
+        lat_deg, lon_deg = (part or 0.0 for part in given)
+        if given is offset:
+            lat_deg, lon_deg, _ = (
+                float(part)
+                for part in enu_to_geodetic(
+                    lat_deg, lon_deg, 0.0, reference_lat_deg=own[0], reference_lon_deg=own[1],
+                    reference_alt_m=own[2],
+                )
+            )  # fmt: skip
+        alt_m = self.alt_m
+        if (alt_m is None) == (self.above_ground_m is None):
+            raise ValueError(
+                f"site {self.name!r}: its height must be given as alt_m, or as above_ground_m"
+            )
+        if self.above_ground_m is not None:
+            ground_m = None if terrain is None else terrain.ground_m(lat_deg, lon_deg)
+            if ground_m is None:
+                raise ValueError(
+                    f"site {self.name!r}: above_ground_m is {self.above_ground_m:g} and [terrain] "
+                    f"knows no ground at {lat_deg:.6g}, {lon_deg:.6g}: give alt_m, or a raster or "
+                    "height_m there"
+                )
+            alt_m = ground_m + self.above_ground_m
+        attitude = {
+            f"{name}_deg": getattr(self, f"{name}_deg") for name in ("yaw", "pitch", "roll")
+        }
+        return Intruder(
+            name=self.name, lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m, **attitude, **_UNSEEN
+        )
+
+
+#: Of an aircraft that no sensor can see.
+_UNSEEN: dict[str, Any] = {
+    "rcs_dbsm": -100.0, "swerling": 0, "eo": NO_AREAS, "ir": {**NO_AREAS, "back_m2": 0.0},
+}  # fmt: skip
+
+
 class ScriptedParameters(SourceParameters):
     """Parameters of scripted traffic."""
 
@@ -101,6 +163,7 @@ class ScriptedParameters(SourceParameters):
     wires: list[OverheadWire] = Field(
         default=[], description="Wires between posts, in the way at rest."
     )
+    sites: list[Site] = Field(default=[], description="Places on the ground that may carry blocks.")
     sample_interval_s: float = Field(
         default=0.1,
         ge=0.001,
@@ -108,11 +171,11 @@ class ScriptedParameters(SourceParameters):
         description="Spacing of the samples at which closest approach is sought, s.",
     )
 
-    @property
-    def targets(self) -> list[Intruder]:
-        """All that may be met: intruders, and after them the pieces of wires."""
-        pieces = [piece for wire in self.wires for piece in wire.pieces()]
-        return self.intruders + [Intruder(**piece) for piece in pieces]
+    def targets(self, terrain: Any) -> list[Intruder]:
+        """Return all that is there: intruders, the pieces of wires, and sites, which stand."""
+        pieces = [Intruder(**piece) for wire in self.wires for piece in wire.pieces()]
+        sites = [site.at_rest(self.ownship.start, terrain) for site in self.sites]
+        return self.intruders + pieces + sites
 
 
 class ScriptedTraffic(TrafficSource):
@@ -126,7 +189,8 @@ class ScriptedTraffic(TrafficSource):
         super().__init__(name, parameters, context)
         own = parameters.ownship
         self.own = flight_of(own, own.start, self.wind)
-        crafts = parameters.targets
+        crafts = parameters.targets(self.context.sections.get("terrain"))
+        self.unseen = tuple(range(len(crafts) - len(parameters.sites), len(crafts)))
         used: set[str] = set()
         for place, craft in enumerate(crafts):
             if craft.name in used:
@@ -141,7 +205,8 @@ class ScriptedTraffic(TrafficSource):
     ) -> FlightsOfRuns | None:
         """Return the flights of runs; those that are all straight are prepared together."""
         own = [p.ownship for p in parameters]
-        crafts = [craft for p in parameters for craft in p.targets]
+        terrain = self.context.sections.get("terrain")
+        crafts = [craft for p in parameters for craft in p.targets(terrain)]
         width = len(self.roster)
         if len(crafts) != width * len(own) or any(flight.legs for flight in (*own, *crafts)):
             return super().flights_of_runs(parameters, make)

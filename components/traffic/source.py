@@ -120,6 +120,8 @@ class TrafficSource(Component):
     own: Trajectory
     targets: Fleet
     roster: Roster
+    #: Targets that nobody sees: places on the ground.
+    unseen: tuple[int, ...] = ()
     also_records = (TrueStates,)
     _offered: KnownTraffic | None = None
 
@@ -233,6 +235,7 @@ class TrafficSource(Component):
             flights,
             crabbing=self.built(ATTITUDE),
             rates_hz=rates_hz,
+            unseen=self.unseen,
             intervals={v.viewer: v.intervals for v in self._views if v.intervals is not None},
         )
 
@@ -313,7 +316,11 @@ class TrafficSource(Component):
         states = self._targets_at(run, seen.columns, time_s)
         present, culled = seen.by_ownship(states.present)
         others = seen.by_others(states.present, self.roster.names)
-        truth = replace(self._flown, intervals={}, rates_hz=None) if self.says_truth else None
+        truth = (
+            replace(self._flown, intervals={}, rates_hz=None, unseen=())
+            if self.says_truth
+            else None
+        )
         asked = any(look.lasts_s > 0.0 for look in self._looks.values())
         return TrafficStates.of(
             wake.ticks,
@@ -407,7 +414,8 @@ class TrafficSource(Component):
         return {
             "targets": {
                 name: {"closest_approach": one if math.isfinite(one["range_m"]) else None}
-                for name, one in approaches.items()
+                for place, (name, one) in enumerate(approaches.items())
+                if place not in self.unseen
             }
         }
 

@@ -85,7 +85,7 @@ class Seen:
     def __init__(
         self, views: Sequence[View], flown: FlownFlights, run: IntArray, time_s: FloatArray
     ) -> None:
-        self._width, self._views = flown.width, views
+        self._width, self._views, self._unseen = flown.width, views, flown.unseen
         self._near = {view.viewer: view.near(flown, run, time_s) for view in views}
         own, columns, _ = self._near[-1]
         #: The state of the ownship at each row, and which targets are to be moved.
@@ -117,6 +117,9 @@ class Seen:
     ) -> tuple[BoolArray, IntArray | None]:
         _, columns, near = self._near[viewer]
         present: BoolArray = there & looking[:, np.newaxis]
+        if self._unseen:
+            # In the place of who looks is the ownship.
+            present[:, np.isin(self.columns, [k for k in self._unseen if k != viewer])] = False
         if near is None:
             return present, None
         if len(columns) != len(self.columns):

@@ -12,7 +12,7 @@ from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters
 
 _MOST_PIECES = 10_000
-_NO_AREAS = {"front_m2": 0.0, "side_m2": 0.0, "horizontal_m2": 0.0}
+NO_AREAS = {"front_m2": 0.0, "side_m2": 0.0, "horizontal_m2": 0.0}
 
 
 class Post(Parameters):
@@ -65,8 +65,8 @@ class OverheadWire(Parameters):
                 "up_m": at[2],
                 "rcs_dbsm": self.rcs_dbsm,
                 "swerling": 0,
-                "eo": _NO_AREAS,
-                "ir": {**_NO_AREAS, "back_m2": 0.0},
+                "eo": NO_AREAS,
+                "ir": {**NO_AREAS, "back_m2": 0.0},
                 "laser": {
                     "reflectivity": self.reflectivity,
                     "wire_diameter_mm": self.diameter_mm,

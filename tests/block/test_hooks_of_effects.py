@@ -3,6 +3,7 @@
 from inspect import signature
 
 import engine_blocks as blocks
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from engine_blocks import Relay
@@ -16,6 +17,7 @@ from dsa_des.block.entry_points import registered
 from dsa_des.block.registry import find
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
+from dsa_des.errors.problems import BlockFailure
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Streams
@@ -85,6 +87,17 @@ def test_an_effect_that_builds_what_its_hook_cannot_use_is_named(
     (problem,) = caught.value.problems
     assert problem.key == f"blocks.{name}"
     assert problem.message.startswith("effect 'halves' of ") and said in problem.message
+
+
+@pytest.mark.parametrize("shape", [(3, 1), (1, 7), (9,)])
+def test_an_effect_of_another_shape_is_named(lab, monkeypatch, shape):
+    effect = Halves("SNR")
+    effect.build = lambda block: lambda cells: np.ones(shape)
+    monkeypatch.setattr(blocks, "Swapped", radar_with(effect), raising=False)
+    scene = load_scene(lab.configs / "first_light.toml", swaps=("radar=engine_blocks:Swapped",))
+    with pytest.raises(BlockFailure, match="effect 'halves' gives an array of shape ") as caught:
+        Simulation(scene).run()
+    assert "radar" in str(caught.value) and str(shape) in str(caught.value)
 
 
 def test_two_effects_of_one_name_are_refused(lab, monkeypatch):

@@ -99,6 +99,14 @@ def test_a_pair_is_as_far_apart_for_the_one_as_for_the_other(scene):
     assert abs(own["slowc_percent"] - ours["slowc_percent"]) > 1.0
 
 
+@pytest.mark.parametrize("metric", ["tracking", "track_errors_by_range"])
+def test_tracks_of_other_platforms_are_not_measured_by_the_ownship(metric):
+    filtered = {"type": "tracking.ekf", "acceleration_intensity_m2_s3": 0.2}
+    how = {"tracker": filtered, "duration_s": 10}
+    with pytest.raises(dsa_des.SceneError, match="those of other platforms not yet"):
+        measured(scene_of(OWN, [B], BOTH, **how), {"metric": metric})
+
+
 def test_a_platform_that_there_is_not_is_said(scene):
     with pytest.raises(dsa_des.SceneError, match="there is no 'bb'; did you mean 'b'"):
         measured(scene, {"metric": "manoeuvres", "platform": "bb"})

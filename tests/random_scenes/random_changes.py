@@ -116,6 +116,22 @@ def timed(tables: dict[str, Any], dice: Dice) -> list[dict[str, Any]]:
     return changes
 
 
+def outages(tables: dict[str, Any], dice: Dice) -> list[dict[str, Any]]:
+    """Return what fails in a scene: a block or two, several times in a run, alone or together."""
+    ends = float(Fraction(tables["duration_s"]))
+    found = []
+    for number in range(dice.pick(1, 1, 2)):
+        blocks = dice.sample(
+            sorted(tables["blocks"]), min(dice.pick(1, 1, 2), len(tables["blocks"]))
+        )
+        found.append({
+            "name": f"bus {number}", "blocks": blocks,
+            "mean_between_s": dice.pick(0.2, 0.5) * ends,
+            "mean_repair_s": dice.pick(0.05, 0.3) * ends, "restart_s": dice.pick(0, 0.1),
+        })  # fmt: skip
+    return found
+
+
 def replicas(tables: dict[str, Any], dice: Dice) -> list[Replica]:
     """Return a few replicas that change the same keys, each to a value of its own.
 

@@ -13,7 +13,7 @@ from typing import Any
 import random_blocks
 import random_flights
 from dice import Dice
-from random_changes import timed
+from random_changes import outages, timed
 
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
@@ -98,6 +98,9 @@ def legal_case(seed: int, folder: Path, changing: float = 0.2) -> Case:
         apart = Dice(11 * seed + 5 + attempt)  # scenes in which nothing changes stay what they were
         if apart.chance(changing, "changes") and (changes := timed(case.tables, apart)):
             case.tables["changes"] = changes
+            case.features |= apart.features
+        if apart.chance(changing / 2, "outages"):
+            case.tables["outages"] = outages(case.tables, apart)
             case.features |= apart.features
         try:
             Simulation(case.load(folder))

@@ -56,6 +56,19 @@ def test_both_sensors_place_an_aircraft_at_60_000_ft():
     assert not len(flown(130_000 * FOOT_M, sensors=("ads_b", "active"))["detections"])
 
 
+def test_who_is_heard_and_not_placed_is_told_with_the_reason():
+    """No code has -1,500 ft: the receiver hears 20 seconds of it and places nothing."""
+    for feet in (-1500, -900):
+        done = flown(feet * FOOT_M, sensors=("ads_b", "active"))
+        said = done.summary.get("undone", {})
+        for name in ("ads_b", "active"):
+            lacking = [counts for why, counts in said.get(name, {}).items() if "altitude" in why]
+            assert bool(len(rows(done, block=name))) == (feet == -900)
+            assert bool(lacking) == (feet == -1500)
+            for times, of in lacking:
+                assert times == of >= 10
+
+
 def test_an_aircraft_of_600_m_s_is_as_fast_as_it_is():
     done = flown(15_000.0, speed_mps=600.0, heading_deg=10.0)
     for row in rows(done)[4:]:

@@ -218,13 +218,11 @@ def _check_library(path: Path, names: list[str], wanted: str, library: str) -> N
 
 
 def _check_variables(path: Path, everything: Any) -> None:
-    """Raise ValueError for two variables of one name, and for inputs that start at no number."""
+    """Raise ValueError for two variables of one name, and for those that start at no number."""
     name, count = Counter(v.name for v in everything).most_common(1)[0] if everything else ("", 1)
     if count > 1:
         raise ValueError(f"{path} has {count} variables of the name {name!r}")
     for v in everything:
-        if v.causality not in ("input", "parameter", "structuralParameter"):
-            continue
         if v.type in (*_KINDS, "Float32", "Float64") and v.start is not None:
             for word in str(v.start).split():
                 if not _is_number(word):

@@ -309,6 +309,10 @@ def test_a_library_that_crashes_when_it_is_loaded_has_failed(lab, lag):
         (2, ('name="gain"', 'name="u"'), "has 2 variables of the name 'u'"),
         (3, ('causality="input" start="0"', 'causality="input" start="NaN"'),
          "'u' starts at 'NaN', which is no number"),
+        (3, ('initial="exact" start="0"', 'initial="exact" start="NaN"'),
+         "'x' starts at 'NaN', which is no number"),
+        (2, ('<Real start="0" unit="ft"/></Sc', '<Real start="nan" unit="ft"/></Sc'),
+         "'x' starts at 'nan', which is no number"),
         (2, ('<Real start="1"/>', '<Real start="one"/>'), "'gain' starts at 'one', which is no"),
     ],
 )  # fmt: skip

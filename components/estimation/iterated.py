@@ -1,0 +1,69 @@
+"""Updates by measurements that turn out far from where they were linearised, iterated.
+
+An extended Kalman filter takes what is measured for linear all the way from where a target was
+expected to where it is. Where that is so far across the line of sight that the arc leaves its
+tangent by more than the measurement's own error, the corrected state is off by what lies between,
+and states a variance in which it is not. Then the update is done again by slopes where it led.
+
+Source: B. M. Bell, F. W. Cathey, "The iterated Kalman filter update as a Gauss-Newton method", IEEE
+Trans. Automatic Control 38 (1993).
+"""
+
+import numpy as np
+
+from components.estimation.batched import selected, times
+from components.estimation.frame import SensorPose
+from components.estimation.kalman import Innovation, innovation, updated
+from components.estimation.measurement import Kind, expected, linearised, residual
+from dsa_des.arrays.types import FloatArray
+
+# By how many deviations of a measurement a step may leave the measured curve: one that leaves it
+# by more is repeated, until one leaves it by less than the other.
+_FAR, _NEAR = 1.0, 0.05
+# A step that has not come to rest by then is left as the first one: none is known to be better.
+_MOST_STEPS = 10
+
+
+def iterate(
+    kind: Kind,
+    pose: SensorPose,
+    before: tuple[FloatArray, FloatArray],
+    after: tuple[FloatArray, FloatArray],
+    first: Innovation,
+    apart: FloatArray,
+) -> None:
+    """Repeat updates that went too far along a tangent, in place in `after`.
+
+    `before` and `after` are states and covariances without and with measurements, of which `first`
+    is the innovation and `apart` the residual; their errors must be none that states carry. Updates
+    within tolerance stay as they are, to the bit.
+    """
+    left = np.flatnonzero(_bend(kind, pose, before[0], after[0], first) > _FAR)
+    if len(left) == 0:
+        return
+    state, covariance = selected(before[0], left), selected(before[1], left)
+    measured = selected(first.expected + apart, left)
+    variance, pose, at = selected(first.spread, left), pose.take(left), selected(after[0], left)
+    for _ in range(_MOST_STEPS):
+        seen, jacobian = linearised(kind, at, pose)
+        here = innovation(seen, jacobian, covariance, variance)
+        back = times(jacobian, (at - state)[: jacobian.shape[1]])
+        moved, spread = updated(state, covariance, here, residual(measured, seen) + back)
+        bend = _bend(kind, pose, at, moved, here)
+        ends = np.flatnonzero(bend <= _NEAR)
+        after[0][:, left[ends]], after[1][:, :, left[ends]] = moved[:, ends], spread[:, :, ends]
+        rest = np.flatnonzero(bend > _NEAR)
+        if not len(rest):
+            return
+        left, at, pose = left[rest], selected(moved, rest), pose.take(rest)
+        state, covariance = selected(state, rest), selected(covariance, rest)
+        measured, variance = selected(measured, rest), selected(variance, rest)
+
+
+def _bend(
+    kind: Kind, pose: SensorPose, state: FloatArray, moved: FloatArray, slope: Innovation
+) -> FloatArray:
+    """Return by how many deviations what is measured leaves the tangent at `state`, at `moved`."""
+    step = (moved - state)[: slope.jacobian.shape[1]]
+    off = residual(expected(kind, moved, pose), slope.expected + times(slope.jacobian, step))
+    return np.asarray(np.sqrt((off * off / slope.spread).max(axis=0)))
