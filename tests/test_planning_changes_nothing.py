@@ -184,7 +184,7 @@ def test_drawing_loss_and_jitter_is_what_everything_means(
 
     def seen(faults: WireFaults, ticks: np.ndarray) -> np.ndarray:
         late = lateness(faults, ticks)
-        drawn.add((faults.jitter_ticks > 0, bool(np.any(late))))
+        drawn.add((bool(np.any(faults.jitter_ticks > 0)), bool(np.any(late))))
         return late
 
     monkeypatch.setattr(WireFaults, "lateness", seen)
