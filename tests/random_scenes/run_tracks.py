@@ -194,9 +194,8 @@ def _off(
     true = before + velocity * (time_s - t0)
     off = state - np.concatenate([true, velocity])
     seen, there = (complex(*(place[:2] - own)) for place in (state, true))
-    along = seen / abs(seen) * complex(
-        abs(seen) - abs(there), abs(seen) * float(np.angle(seen / there))
-    )  # fmt: skip
+    turn = float(np.angle(seen * there.conjugate()))  # 0 where either is overhead
+    along = np.exp(1j * np.angle(seen)) * complex(abs(seen) - abs(there), abs(seen) * turn)
     on_arc = np.array([along.real, along.imag, off[2]])
     place = min(one @ np.linalg.solve(spread[:3, :3], one) for one in (off[:3], on_arc))
     whole = off @ np.linalg.solve(spread, off)
