@@ -39,30 +39,15 @@ def pressure_altitude_m(
     offset_k : array_like, K
         How much warmer the air is than the standard's at every height, above -100.
     """
-    shape, (height, qnh, offset) = _checked("height_m", height_m, qnh_hpa, offset_k)
+    offsets = finite("offset_k", offset_k)
+    refuse("offset_k", offsets, offsets <= -100.0, "be above -100")
+    heights = within("height_m", height_m, LOWEST_M, HIGHEST_M, "m")
+    shape, (height, qnh, offset) = broadcast_flat(
+        height_m=heights, qnh_hpa=positive("qnh_hpa", qnh_hpa), offset_k=offsets
+    )
     standard = (qnh == STANDARD_HPA) & (offset == 0.0)
     drop = _log_drop(height, offset) - np.log(qnh / STANDARD_HPA)
     return unflatten(np.where(standard, height, _height_of(drop, np.zeros_like(drop))), shape)
-
-
-def height_of_pressure_altitude_m(
-    altitude_m: ArrayLike, *, qnh_hpa: ArrayLike = STANDARD_HPA, offset_k: ArrayLike = 0.0
-) -> Any:
-    """Return the height above sea level at which an altimeter reads an altitude, m.
-
-    The inverse of `pressure_altitude_m`, with its parameters.
-    """
-    shape, (altitude, qnh, offset) = _checked("altitude_m", altitude_m, qnh_hpa, offset_k)
-    standard = (qnh == STANDARD_HPA) & (offset == 0.0)
-    drop = _log_drop(altitude, np.zeros_like(altitude)) + np.log(qnh / STANDARD_HPA)
-    return unflatten(np.where(standard, altitude, _height_of(drop, offset)), shape)
-
-
-def _checked(name: str, height_m: ArrayLike, qnh_hpa: ArrayLike, offset_k: ArrayLike) -> Any:
-    offset = finite("offset_k", offset_k)
-    refuse("offset_k", offset, offset <= -100.0, "be above -100")
-    height = within(name, height_m, LOWEST_M, HIGHEST_M, "m")
-    return broadcast_flat(height_m=height, qnh_hpa=positive("qnh_hpa", qnh_hpa), offset_k=offset)
 
 
 def _log_drop(height: Any, offset: Any) -> Any:
