@@ -62,6 +62,19 @@ def test_a_block_that_is_out_does_not_scan_in_any_window_and_beside_other_runs()
     assert never["scans"].filter(kept).equals(whole["scans"])
 
 
+def test_what_comes_over_the_wires_of_a_block_that_is_out_is_lost():
+    late = ["traffic -> transform -> gate", "gate -> radar",
+            {"from": "radar", "to": "fusion", "delay_s": 0.3}]  # fmt: skip
+    failing = scene(wires=late, outages=[outage("fusion")])
+    simulation, tables = tables_of(failing)
+    _, never = tables_of(scene(wires=late))
+    arrived = scans_of(never["fused"])
+    at = RunTicks.of_run(0, np.rint(np.array(arrived) * 1e9).astype(np.int64))
+    up = simulation.timeline.outages("fusion").up(at)
+    assert 0.1 < up.mean() < 0.9
+    assert tables["fused"].equals(never["fused"].filter(up))
+
+
 @covers("restart_s", of=("[outages]",))
 def test_a_restart_takes_its_time():
     def missing(**keys):
