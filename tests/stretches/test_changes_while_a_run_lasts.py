@@ -5,10 +5,12 @@ from fractions import Fraction
 import numpy as np
 import pyarrow as pa
 import pytest
+from click.testing import CliRunner
 from covering import covers
 from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 
 import dsa_des
+from dsa_des.cli import main
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
@@ -268,6 +270,14 @@ def test_a_run_folder_says_what_changed():
     again = dsa_des.load_scene(changed.resolved())
     assert again.stretches[0].from_s == Fraction(1, 3)
     assert [one.written() for one in again.changes] == [one.written() for one in changed.changes]
+
+
+def test_a_run_prints_what_changes_when(tmp_path):
+    path = tmp_path / "changes.toml"
+    path.write_text(to_toml(scene(change("blocks.radar.enabled", False)).resolved()))
+    words = ["run", str(path), "--out", str(tmp_path / "out"), "--no-figures"]
+    printed = CliRunner().invoke(main, words, catch_exceptions=False).stdout
+    assert "from 13 s to 27 s: blocks.radar.enabled = false\n" in printed
 
 
 def test_costs_are_of_scenes_that_stay_as_they_are(tmp_path):
