@@ -1,79 +1,19 @@
-"""The table files that an aircraft names, and their content."""
+"""What sensors need to know of aircraft, and of all aircraft of a run."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
-from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter, model_validator
+from pydantic import Field, model_validator
 
 from components.aircraft.equipage import AdsBEquipage, Equipage, IcaoAddress
+from components.aircraft.table_files import RcsTableFile, SilhouetteTableFile
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.component import Parameters, ScenePath
-from dsa_des.files.input_files import InputFileError, read_once, status_of
-from dsa_des.text.safe_text import shortened
+from dsa_des.block.component import Parameters
 from dsa_des.time.randomness import target_keys
-
-#: A table of every degree in both angles is a hundredth of it.
-LARGEST_TABLE_BYTES = 64 * 1024 * 1024
-
-_PATH: TypeAdapter[Path] = TypeAdapter(ScenePath)
-
-
-@dataclass(frozen=True, eq=False)
-class TableFile:
-    """A table that was read while the scene was checked, so that a bad file stops no run half-way.
-
-    It is an `RcsTable` or a `SilhouetteTable` of `components.aircraft.aspect_tables`.
-    """
-
-    path: Path
-    table: Any
-
-
-def _rcs(path: Path) -> Any:
-    from components.aircraft.aspect_tables import RcsTable
-
-    return RcsTable.from_csv(path)
-
-
-def _silhouette(path: Path) -> Any:
-    from components.aircraft.aspect_tables import read_aspect_table
-
-    return read_aspect_table(path)
-
-
-@read_once(64)
-def _read(path: Path, reader: Callable[[Path], Any]) -> TableFile:
-    # Aircraft that name the same file share one table, and are looked up in it together.
-    status_of(path, LARGEST_TABLE_BYTES)
-    return TableFile(path, reader(path))
-
-
-def _validator(reader: Callable[[Path], Any]) -> Callable[[Any], TableFile]:
-    def validate(value: Any) -> TableFile:
-        if isinstance(value, TableFile):
-            return value
-        path = _PATH.validate_python(value)
-        name = shortened(str(path), 300)
-        try:
-            return _read(path, reader)
-        except InputFileError as error:
-            raise ValueError(f"must be a table that can be read: {name}: {error}") from None
-
-    return validate
-
-
-_AS_PATH = PlainSerializer(lambda file: str(file.path))
-
-#: A CSV file with the columns az_deg, el_deg and dbsm.
-RcsTableFile = Annotated[TableFile, PlainValidator(_validator(_rcs)), _AS_PATH]
-
-#: A CSV file with the columns az_deg, el_deg and an area.
-SilhouetteTableFile = Annotated[TableFile, PlainValidator(_validator(_silhouette)), _AS_PATH]
 
 
 class VisibleAreas(Parameters):

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from components.flights.fleet import PieceSearch
+from components.flights.fleet import Fleet, PieceSearch, Trajectory
 from components.geometry import slant_range_m
 from dsa_des.arrays.types import FloatArray, IntArray
 
@@ -279,3 +279,20 @@ def _looked_at_s(
         first[some] = np.fmin(first[some], times.at(some, low[some]))
         last[some] = np.fmax(last[some], times.at(some, high[some]))
     return first, last
+
+
+def approaches_of_run(
+    own: Trajectory, targets: Fleet, times: Sequence[SampleTimes], end_s: float, *, between: bool
+) -> Approaches:
+    """Return how near targets come over a run, compared at some times, and `between` them too."""
+    best, speeds = Approaches.none(len(targets)), targets.max_speeds_mps
+    present_s = present_together_s(own, targets.intervals_present_s, end_s)
+    flights = (lambda _, time_s: own.at(time_s)), targets.each
+    for some in times:
+        closest_approaches(
+            *flights, some,
+            closing_speed_mps=speeds + own.max_speed_mps, present_s=present_s, best=best,
+        )  # fmt: skip
+    if between:
+        look_between(*flights, np.full(len(speeds), STEP_S), present_s, best)
+    return best

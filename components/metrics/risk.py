@@ -5,10 +5,11 @@ numbers, and has a weight that says how often it happens in the airspace. The ri
 `dsa_des.results.ratio` computes, under the field's names.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
 from components.arguments.units import FOOT_M
@@ -18,7 +19,7 @@ from components.metrics.rows import TargetParameters
 from components.metrics.separation import RelativeFlight, relative_states, traffic_block
 from components.well_clear.severity import collision_probability, loss_severity
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
+from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, FRACTION, NUMBER, Group, Result
 
@@ -29,7 +30,6 @@ __all__ = [
 
 RiskRatio = PairedRatio
 risk_ratio = paired_ratio
-risk_ratios_by_class = ratios_by_class
 
 #: By the sizes of their volumes.
 _EVENTS = ("well_clear_lost", "nmac")
@@ -198,3 +198,36 @@ class Severity(FlownMetric):
         step_s = self.p.step_s / _FINER
         about = time_s + step_s * np.arange(-_FINER, _FINER + 1)
         return np.clip(about, max(first_s, 0.0), min(last_s, flight.end_s))
+
+
+def risk_ratios_by_class(
+    nominal: npt.ArrayLike,
+    mitigated: npt.ArrayLike,
+    weight: npt.ArrayLike | None,
+    labels: npt.ArrayLike,
+    cluster: npt.ArrayLike | None = None,
+    **options: object,
+) -> dict[str, RiskRatio]:
+    """Return the ratio of every class of encounters, in order of the classes' names.
+
+    Parameters
+    ----------
+    nominal, mitigated, weight
+        As in `risk_ratio`.
+    labels : (encounters,)
+        The class of each, for example of its geometry.
+    cluster : (encounters,), optional
+    **options
+        Keywords of `risk_ratio`.
+    """
+    n, m, names = np.asarray(nominal), np.asarray(mitigated), np.asarray(labels)
+    w = np.ones(len(n)) if weight is None else np.asarray(weight)
+    ratio: Callable[..., RiskRatio] = paired_ratio
+    if len(names) != len(n):
+        raise ValueError(f"there are {len(names)} classes for {len(n)} encounters")
+    ratios = {}
+    for name in np.unique(names):
+        mine = names == name
+        together = None if cluster is None else np.asarray(cluster)[mine]
+        ratios[str(name)] = ratio(n[mine], m[mine], w[mine], cluster=together, **options)
+    return ratios

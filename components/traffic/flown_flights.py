@@ -7,20 +7,90 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.flights.culling import NearIntervals
-from components.flights.fleet import Fleet
-from components.flights.many_flights import SteeredFleet, WithOthers
+from components.flights.fleet import Fleet, in_rows
+from components.flights.many_flights import SteeredFleet
 from components.geometry import TrajectoryState
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.keyed_table import turns
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
+
+
+class OfEachRun(Fleet):
+    """One of the targets of each run, by its index, as a fleet of one for each run."""
+
+    def __init__(self, targets: Fleet, width: int, index: int) -> None:
+        self._targets, self._width, self._index = targets, width, index
+
+    def __len__(self) -> int:
+        return len(self._targets) // self._width
+
+    def __getitem__(self, run: int) -> Any:  # type: ignore[override]
+        return self._targets[range(len(self))[run] * self._width + self._index]
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states (n,) in some runs, each at a time (n,) of its own, in s."""
+        return self._targets.each(aircraft * self._width + self._index, time_s)
+
+    def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return speeds over ground, asked for as in `each`; NaN where no script says them."""
+        return self._targets.ground_speeds_mps(aircraft * self._width + self._index, time_s)
+
+    def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return fixed yaw, pitch and roll (3, n), asked for as in `each`; NaN where not fixed."""
+        return self._targets.fixed_attitudes_rad(aircraft * self._width + self._index, time_s)
+
+
+class WithOthers(Fleet):
+    """Targets of which some fly otherwise: by index in a run, a fleet of one for each run."""
+
+    def __init__(self, targets: Fleet, width: int, others: Mapping[int, Fleet]) -> None:
+        self._targets, self._width, self._others = targets, width, others
+
+    def __len__(self) -> int:
+        return len(self._targets)
+
+    def __getitem__(self, index: int) -> Any:  # type: ignore[override]
+        run, column = divmod(range(len(self))[index], self._width)
+        return self._others[column][run] if column in self._others else self._targets[index]
+
+    @cached_property
+    def max_speeds_mps(self) -> FloatArray:
+        """Largest speed of each along its path, shape (flights,)."""
+        result = self._targets.max_speeds_mps.copy()
+        for column, others in self._others.items():
+            result[column :: self._width] = others.max_speeds_mps
+        return result
+
+    @cached_property
+    def intervals_present_s(self) -> FloatArray:
+        """First and last time at which each is there, shape (flights, 2)."""
+        result = self._targets.intervals_present_s.copy()
+        for column, others in self._others.items():
+            result[column :: self._width] = others.intervals_present_s
+        return result
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states of flights (n,), each at a time (n,) of its own, in s."""
+        run, column = np.divmod(aircraft, self._width)
+        left: BoolArray = np.ones(len(aircraft), dtype=bool)
+        rows, states = [], []
+        for index, others in self._others.items():
+            mine = np.flatnonzero(column == index)
+            left[mine] = False
+            rows.append(mine)
+            states.append(others.each(run[mine], time_s[mine]))
+        rows.append(np.flatnonzero(left))
+        states.append(self._targets.each(aircraft[left], time_s[left]))
+        return in_rows(rows, states)
 
 
 class FlightsOfRuns(NamedTuple):
@@ -48,6 +118,14 @@ class FlownFlights:
     intervals: Mapping[int, NearIntervals] = field(default_factory=dict)
     rates_hz: FloatArray | None = None
     unseen: tuple[int, ...] = ()
+
+    @classmethod
+    def of(cls, own: Fleet, targets: Fleet, platforms: Sequence[int]) -> FlownFlights:
+        """Return the flights of all runs, with the ownship and targets by index as platforms."""
+        width = len(targets) // len(own)
+        others = sorted({index for index in platforms if index >= 0})
+        fleets = {index: SteeredFleet(OfEachRun(targets, width, index)) for index in others}
+        return cls({-1: SteeredFleet(own), **fleets}, targets)
 
     @property
     def own(self) -> SteeredFleet:

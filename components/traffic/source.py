@@ -23,16 +23,13 @@ from components.flights.bounds import (
 )
 from components.flights.closest_approach import (
     STEP_S,
-    Approaches,
     RegularTimes,
     SampleTimes,
+    approaches_of_run,
     censored_approaches,
-    closest_approaches,
-    look_between,
-    present_together_s,
 )
 from components.flights.fleet import Fleet, Trajectory
-from components.flights.many_flights import OfEachRun, SteeredFleet, SteeredFlight, fleet_of
+from components.flights.many_flights import SteeredFlight, fleet_of
 from components.geometry import TrajectoryState
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import farthest_look
@@ -46,11 +43,12 @@ from components.traffic.flown_flights import (
     due_manoeuvres,
     steered,
 )
+from components.traffic.recorded_truth import truth_is_recorded
 from components.traffic.views import Seen, View
 from components.traffic.wind_effect import ATTITUDE
 from dsa_des.arrays.run_ticks import no_runs
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.component import Component, Context, Input, Output, Parameters, PositiveRational
+from dsa_des.block.component import Component, Input, Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import ClockSpec
@@ -64,30 +62,6 @@ class SourceParameters(Parameters):
         description="Rate at which positions are published; sensors then see the last one. By "
         "default they are known at every scan instant.",
     )
-
-
-#: The truth is recorded without being asked for where aircraft times seconds, of all runs that are
-#: recorded together, are at most this: some ten thousand rows with the usual sensors.
-SMALL_S = 600.0
-_TABLE = "truth"
-
-
-def truth_is_recorded(context: Context, targets: int) -> bool:
-    """Return whether a scene records where all aircraft are.
-
-    Where tables are chosen, as a study chooses those that its metrics read, that one is among them
-    or it is not made.
-
-    How often sensors look does not count: replicas whose clocks differ record the same tables.
-    """
-    record = context.sections.get("record")
-    asked = "auto" if record is None else record.truth
-    if context.recorded_tables is not None:
-        return asked is not False and _TABLE in context.recorded_tables
-    if asked == "auto":
-        seconds = context.recorded_runs * float(context.duration_s)
-        return (1 + targets) * seconds <= SMALL_S
-    return bool(asked)
 
 
 class TrafficSource(Component):
@@ -206,7 +180,7 @@ class TrafficSource(Component):
 
     def _flights(self, platforms: Sequence[int]) -> FlownFlights:
         """Return this run's own flights, with the ownship and targets as platforms."""
-        return _with_platforms(fleet_of([self.own]), self.targets, platforms)
+        return FlownFlights.of(fleet_of([self.own]), self.targets, platforms)
 
     def _fly(self, flights: FlownFlights, roster: Roster, parameters: Sequence[Any]) -> None:
         """Take the flights of all runs, of which this one is the first, and how they publish."""
@@ -227,7 +201,7 @@ class TrafficSource(Component):
                 viewer,
                 look if culls else replace(look, range_m=math.inf),
                 duration_s + look.lasts_s,
-                None if steered is None else _seen_from(viewer, steered),
+                steered,
             )
             for viewer, look in self._looks.items()
         ]
@@ -269,7 +243,7 @@ class TrafficSource(Component):
         for number in range(len(parameters)):
             self._check_terrain(partial(_one_of, flights.own, number))
         of_all = copy(self)
-        flown = _with_platforms(flights.own, flights.targets, [*self._flown.platforms])
+        flown = FlownFlights.of(flights.own, flights.targets, [*self._flown.platforms])
         of_all._fly(flown, flights.roster, parameters)
         return of_all
 
@@ -296,15 +270,7 @@ class TrafficSource(Component):
 
     def left_out(self) -> list[str]:
         """Say how far targets matter."""
-        said = []
-        for view in self._views:
-            if view.culls:
-                whose = "" if view.viewer < 0 else f" on {self.roster.names[view.viewer]}"
-                said.append(
-                    f"targets beyond {view.reach_m[0] / 1000.0:.2f} km: not moved, no sensor"
-                    f"{whose} looks farther"
-                )
-        return said
+        return [view.left_out(self.roster.names) for view in self._views if view.culls]
 
     def run(self, wake: Wake) -> Message | None:
         """Return the state of all aircraft that may matter, at every instant."""
@@ -312,15 +278,12 @@ class TrafficSource(Component):
         run = wake.run if len(self._flown.own) > 1 else no_runs(len(wake))
         time_s = wake.time_s
         known = self._steer(wake, run)
-        seen = Seen(self._views, self._flown, run, time_s)
+        flown = self._flown
+        seen = Seen(self._views, flown, run, time_s)
         states = self._targets_at(run, seen.columns, time_s)
         present, culled = seen.by_ownship(states.present)
         others = seen.by_others(states.present, self.roster.names)
-        truth = (
-            replace(self._flown, intervals={}, rates_hz=None, unseen=())
-            if self.says_truth
-            else None
-        )
+        truth = replace(flown, intervals={}, rates_hz=None, unseen=()) if self.says_truth else None
         asked = any(look.lasts_s > 0.0 for look in self._looks.values())
         return TrafficStates.of(
             wake.ticks,
@@ -332,7 +295,7 @@ class TrafficSource(Component):
             culled=culled,
             present_to={name: there for name, (there, _) in others.items()} or None,
             culled_to={name: count for name, (_, count) in others.items()} or None,
-            flights=KnownFlights(self._flown, run, known) if asked else None,
+            flights=KnownFlights(flown, run, known) if asked else None,
             true_flights=None if truth is None else KnownFlights(truth, run, known),
             run_time_s=None if truth is None else time_s,
         )
@@ -404,8 +367,10 @@ class TrafficSource(Component):
         """
         end_s = float(self.context.duration_s)
         names = self.roster.names
-        best = self._closest_approaches(end_s)
-        where = censored_approaches(self, self._compared_at(end_s), best.time_s, end_s)
+        times = self._compared_at(end_s)
+        between = not self._seeks_at_samples
+        best = approaches_of_run(self.own, self.targets, times, end_s, between=between)
+        where = censored_approaches(self, times, best.time_s, end_s)
         closest = zip(names, best.time_s.tolist(), best.range_m.tolist(), where, strict=True)
         approaches = {
             name: {"time_s": time_s, "range_m": range_m, **({"at": at} if at else {})}
@@ -418,20 +383,6 @@ class TrafficSource(Component):
                 if place not in self.unseen
             }
         }
-
-    def _closest_approaches(self, end_s: float) -> Approaches:
-        best = Approaches.none(len(self.targets))
-        speeds = self.targets.max_speeds_mps
-        present_s = present_together_s(self.own, self.targets.intervals_present_s, end_s)
-        flights = (lambda _, time_s: self.own.at(time_s)), self.targets.each
-        for times in self._compared_at(end_s):
-            closest_approaches(
-                *flights, times,
-                closing_speed_mps=speeds + self.own.max_speed_mps, present_s=present_s, best=best,
-            )  # fmt: skip
-        if not self._seeks_at_samples:
-            look_between(*flights, np.full(len(speeds), STEP_S), present_s, best)
-        return best
 
     @property
     def _seeks_at_samples(self) -> bool:
@@ -447,16 +398,3 @@ class TrafficSource(Component):
 def _one_of(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
     """Return the states of one flight of many at times (n,)."""
     return fleet.each(np.full(len(time_s), aircraft), time_s)
-
-
-def _with_platforms(own: Fleet, targets: Fleet, platforms: Sequence[int]) -> FlownFlights:
-    """Return the flights of all runs, with the ownship and targets by index as platforms."""
-    width = len(targets) // len(own)
-    others = sorted({index for index in platforms if index >= 0})
-    fleets = {index: SteeredFleet(OfEachRun(targets, width, index)) for index in others}
-    return FlownFlights({-1: SteeredFleet(own), **fleets}, targets)
-
-
-def _seen_from(viewer: int, platforms: Sequence[int]) -> list[int]:
-    """Return the places of platforms among the targets of who looks, itself left out."""
-    return [viewer if one < 0 else one for one in platforms if one != viewer]

@@ -17,8 +17,7 @@ class View:
     """What one platform may look at of all flights.
 
     The target from which it looks, -1 for the ownship, has changed places with that one. Where
-    aircraft may be `steered` (their places in the view), nothing is known of them ahead: these are
-    looked at all the time.
+    platforms are `steered`, nothing is known of them ahead: these are looked at all the time.
     """
 
     def __init__(
@@ -33,7 +32,9 @@ class View:
         self.intervals: NearIntervals | None = None
         self.epochs: SteeredCulling | None = None
         self.reach_m: FloatArray = np.full(1, look.range_m)
-        self._width, self._steered = flights.width, list(steered or ())
+        self._width = flights.width
+        #: The places in the view of who may be steered, without who looks.
+        self._steered = [viewer if one < 0 else one for one in steered or () if one != viewer]
         if math.isinf(look.range_m):
             return
         own, others = flights.seen_from(viewer)
@@ -53,6 +54,14 @@ class View:
     def culls(self) -> bool:
         """Whether any target may be left out."""
         return self.intervals is not None or self.epochs is not None
+
+    def left_out(self, names: Sequence[str]) -> str:
+        """Say how far targets of these names matter."""
+        whose = "" if self.viewer < 0 else f" on {names[self.viewer]}"
+        return (
+            f"targets beyond {self.reach_m[0] / 1000.0:.2f} km: not moved, no sensor{whose} looks "
+            "farther"
+        )
 
     def near(
         self, flown: FlownFlights, run: IntArray, time_s: FloatArray

@@ -107,6 +107,8 @@ def run_scene(
         say_json(summary)
     elif not quiet:
         console = terminal.console()
+        for change in loaded.changes:
+            say(change.sentence())
         for report in load_reports():
             report.show(console, summary)
         if pacer is not None:

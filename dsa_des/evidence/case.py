@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.results.record import Result, as_text
+from dsa_des.results.record import Result
 from dsa_des.scene.keys import flat, key_in
 from dsa_des.scene.overrides import apply_sets
 from dsa_des.scene.parameter_errors import explain
@@ -23,6 +23,7 @@ from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.identity import results_of
 from dsa_des.studies.study import Study, set_text
 from dsa_des.studies.study_file import read_study
+from dsa_des.text.run_commands import as_text
 
 #: The name of the study of the system itself, and of the one that changes a parameter at a time.
 ASSESSED, SENSITIVITY = "assessed", "sensitivity"

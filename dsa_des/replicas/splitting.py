@@ -184,5 +184,6 @@ def find_levels(
     so_far = f" that came to a score of {levels[-1]:.4g}" if levels else ""
     raise ValueError(
         f"the score never rises: of {len(roots)} runs of the pilot of splitting{so_far} none comes "
-        "nearer to the event, whatever is drawn from then on"
+        "nearer to the event, whatever is drawn from then on; take another splitting.score, more "
+        "splitting.runs, or splitting.levels of your own"
     )

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.results.ratio import PairedRatio, influences, paired_ratio, unseen_variance
+from dsa_des.results.ratio import PairedRatio, influences, paired_ratio
 from dsa_des.results.statistics import (
     FEW,
     Estimate,
@@ -20,6 +20,7 @@ from dsa_des.results.statistics import (
     standard_error,
     symmetric,
     t_quantile,
+    unseen_event,
     within,
 )
 
@@ -252,7 +253,7 @@ def ratio_difference(
     each = np.array([np.bincount(index, weights=part) for part in parts])
     value, few = ratios[1].ratio - ratios[0].ratio, any(ratio.few for ratio in ratios)
     events = np.bincount(index, weights=second.weight * second.below).astype(float)
-    more = 2.0 * unseen_variance(events)
+    more = 2.0 * _unseen_variance(events)
     joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + more))
     # A ratio whose runs all agree has no such error; its interval tells another.
     alike = sum(
@@ -266,6 +267,16 @@ def ratio_difference(
         symmetric(value, apart, each.shape[1], few, confidence),
         *alone,
     )
+
+
+def _unseen_variance(nominal: FloatArray) -> float:
+    """Return what one event more, or less, adds to the variance of a ratio.
+
+    `nominal` are the clusters' terms below the line; one event more weighs what those do, drawn in
+    proportion to their weights.
+    """
+    part, _ = scaled(nominal)
+    return unseen_event(part)[1] / math.fsum(part) ** 2
 
 
 def estimate_of(ratio: PairedRatio) -> Estimate:

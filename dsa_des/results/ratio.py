@@ -29,22 +29,20 @@ difference estimator: C.-E. Särndal, B. Swensson & J. Wretman, "Model assisted 
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.errors import shown_value
-from dsa_des.results.statistics import gamma_interval, scaled, unseen_event
+from dsa_des.results.statistics import gamma_interval, resampled_ratios, scaled, unseen_event
 
 #: Intervals: by gamma distributions, of the logarithm of the ratio by its standard error, or of
 #: drawn sets of encounters.
 METHODS = ("gamma", "delta", "bootstrap")
-# Counts of drawn encounters that are in memory at once.
-_AT_ONCE = 2_000_000
 _FEW = 20.0
 #: What it costs to know an encounter's flights without a remedy, by what it costs to fly it with
 #: one (`radar_and_camera_risk`: 0.38 of 5 ms, most of it to make the encounter). A fixed number, so
@@ -179,7 +177,8 @@ def paired_ratio(
     left, ratio = above - added, above / below
     each, x, y = terms
     residual = y - ratio * x
-    error = math.sqrt(math.fsum(residual * residual)) / below
+    squared = math.fsum(residual * residual)
+    error = math.sqrt(squared) / below
     spread = y - above / total * each
     unpaired = math.sqrt(math.fsum(spread * spread)) / below
     tail = (1.0 - confidence) / 2.0
@@ -192,7 +191,7 @@ def paired_ratio(
         possible = -math.log(tail) * math.fsum(x**2) / below**2
         interval = max(0.0, ratio - possible), ratio + possible
     elif method == "bootstrap":
-        ratios = _resampled(x, y, resamples, seed)
+        ratios = resampled_ratios(x, y, resamples, seed)
         error = float(np.std(ratios, ddof=1)) if len(ratios) > 1 else math.nan
         low, high = np.quantile(ratios, [tail, 1.0 - tail]) if len(ratios) else (math.nan,) * 2
         interval = float(low), float(high)
@@ -204,21 +203,26 @@ def paired_ratio(
     few = method != "gamma" and math.fsum(y**2) < _FEW * unseen_event(np.maximum(x, y))[1]
     return PairedRatio(
         ratio, added / below, left / below, error, interval, unpaired, sizes, *counts,
-        below / total, above / total, method, "", few, len(each), *_gain(n, m, w, s, d, ratio),
+        below / total, above / total, method, "", few, len(each),
+        *_gain(n, m, w, s, d, ratio, squared),
     )  # fmt: skip
 
 
 def _gain(
     nominal: FloatArray, mitigated: FloatArray, weight: FloatArray, stands_for: FloatArray | None,
-    predicted: FloatArray | None, ratio: float,
+    predicted: FloatArray | None, ratio: float, sampled: float,
 ) -> tuple[int, float]:  # fmt: skip
-    """Return how many were flown, and by how much that is cheaper than all at the same width."""
+    """Return how many were flown, and by how much that is cheaper than all at the same width.
+
+    `sampled` is the sum of the squared residuals of clusters. Encounters are drawn independently,
+    so what those of a cluster have in common is as much with all of them flown.
+    """
     flown = _many_flown(nominal, stands_for)
     if stands_for is None:
         return flown, 1.0
+    each = (weight * (_expanded(mitigated, stands_for, predicted) - ratio * nominal)) ** 2
     plain = math.fsum(stands_for * (weight * (mitigated - ratio * nominal)) ** 2)
-    expanded = _expanded(mitigated, stands_for, predicted)
-    sampled = math.fsum((weight * (expanded - ratio * nominal)) ** 2)
+    plain += sampled - math.fsum(each)
     cost = flown / len(nominal) + FORESEEN_COST
     return flown, plain / (sampled * cost) if sampled > 0.0 else math.nan
 
@@ -260,39 +264,6 @@ def sampled_share(
     return replace(one, interval=(low, min(high, 1.0)))
 
 
-def ratios_by_class(
-    nominal: npt.ArrayLike,
-    mitigated: npt.ArrayLike,
-    weight: npt.ArrayLike | None,
-    labels: npt.ArrayLike,
-    cluster: npt.ArrayLike | None = None,
-    **options: object,
-) -> dict[str, PairedRatio]:
-    """Return the ratio of every class of encounters, in order of the classes' names.
-
-    Parameters
-    ----------
-    nominal, mitigated, weight
-        As in `paired_ratio`.
-    labels : (encounters,)
-        The class of each, for example of its geometry.
-    cluster : (encounters,), optional
-    **options
-        Keywords of `paired_ratio`.
-    """
-    n, m, names = np.asarray(nominal), np.asarray(mitigated), np.asarray(labels)
-    w = _weights(weight, len(n))
-    ratio: Callable[..., PairedRatio] = paired_ratio
-    if len(names) != len(n):
-        raise ValueError(f"there are {len(names)} classes for {len(n)} encounters")
-    ratios = {}
-    for name in np.unique(names):
-        mine = names == name
-        together = None if cluster is None else np.asarray(cluster)[mine]
-        ratios[str(name)] = ratio(n[mine], m[mine], w[mine], cluster=together, **options)
-    return ratios
-
-
 def influences(
     nominal: npt.ArrayLike,
     mitigated: npt.ArrayLike,
@@ -321,16 +292,6 @@ def _expanded(
         return flags
     result = stands_for * flags
     return result if predicted is None else result + (1.0 - stands_for) * predicted
-
-
-def unseen_variance(nominal: FloatArray) -> float:
-    """Return what one event more, or less, adds to the variance of a ratio.
-
-    `nominal` are the clusters' terms below the line; one event more weighs what those do, drawn in
-    proportion to their weights.
-    """
-    part, _ = scaled(nominal)
-    return unseen_event(part)[1] / math.fsum(part) ** 2
 
 
 def taken_over(stands_for: FloatArray, lost: Sequence[float], of: BoolArray) -> FloatArray:
@@ -426,27 +387,3 @@ def _why_none(nominal: FloatArray, total: float) -> str:
     if nominal.any():
         return "the encounters with a nominal event weigh nothing"
     return "no encounter has a nominal event"
-
-
-def _resampled(below: FloatArray, above: FloatArray, resamples: int, seed: int) -> FloatArray:
-    """Return ratios of sets of encounters drawn with replacement.
-
-    Encounters without any event are drawn together: they add nothing to either sum. Those that are
-    alike in both sums are too, which leaves few kinds where weights repeat.
-    """
-    pairs = np.stack([below, above], axis=1)
-    pairs = pairs[pairs.any(axis=1)]
-    kinds, many = np.unique(pairs, axis=0, return_counts=True)
-    # The last kind: all encounters without an event.
-    kinds = np.concatenate([kinds, np.zeros((1, 2))])
-    many = np.append(many, len(below) - len(pairs))
-    generator = np.random.Generator(np.random.Philox(seed))
-    step = max(1, _AT_ONCE // len(kinds))
-    parts = []
-    for start in range(0, resamples, step):
-        some = min(step, resamples - start)
-        drawn: IntArray = generator.multinomial(len(below), many / len(below), size=some)
-        sums = drawn @ kinds
-        good = sums[:, 0] > 0.0
-        parts.append(sums[good, 1] / sums[good, 0])
-    return np.concatenate(parts)

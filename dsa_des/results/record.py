@@ -6,14 +6,14 @@ saved of results, limits and figures is what the study itself uses.
 """
 
 import math
-import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from dsa_des.text.run_commands import as_text, run_command
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -375,28 +375,3 @@ def predicted_column(event: str) -> str:
 def draw_column(key: str) -> str:
     """Return the column of a drawn value."""
     return f"draw.{key.removeprefix('blocks.')}"
-
-
-def run_command(
-    scene: str,
-    seed: int,
-    swaps: Iterable[tuple[str, str]],
-    sets: Iterable[tuple[str, str]],
-) -> str:
-    """Return the command that runs a scene with a seed, swaps and values, fit for a shell."""
-    words = ["dsa-des", "run", scene, "--seed", str(seed)]
-    for block, name in swaps:
-        words += ["--swap", f"{block}={name}"]
-    for key, value in sets:
-        words += ["--set", f"{key}={value}"]
-    return shlex.join(words)
-
-
-def as_text(value: Any) -> str:
-    """Return a value the way ``--set`` takes it."""
-    if isinstance(value, Fraction):
-        decimal = f"{float(value):.9f}".rstrip("0").rstrip(".")
-        return decimal if Fraction(decimal) == value else f'"{value}"'
-    if isinstance(value, bool):
-        return str(value).lower()
-    return repr(value) if isinstance(value, float) else str(value)

@@ -27,9 +27,10 @@ from dsa_des.results.models import (
     versions,
 )
 from dsa_des.results.printing import RATIO_HEADS, interval_text, ratio_cells, rounded
-from dsa_des.results.record import EVENT, FRACTION, NUMBER, RATIO, run_command
+from dsa_des.results.record import EVENT, FRACTION, NUMBER, RATIO
 from dsa_des.results.summary import Answer, Line, one_sided
 from dsa_des.results.tables import Tables, cut_off_text
+from dsa_des.text.run_commands import run_command
 from dsa_des.text.safe_text import printable, shortened
 
 REPORT = "report.html"

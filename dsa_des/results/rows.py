@@ -374,27 +374,6 @@ class Rows:
         alone = len(mine) - len(here), len(other) - len(there)
         return ratio_difference(one.of(here), two.of(there), alone, confidence)
 
-    def event_ratio(
-        self, name: str, first: IntArray, second: IntArray, weight: str | None, confidence: float
-    ) -> PairedRatio:
-        """Return how often an event happens in some rows, by how often in others: run by run.
-
-        Rows `first` are below the line, `second` above; runs that only one has do not count. The
-        result `weight` says how often each unit happens.
-        """
-        sides = []
-        for rows in (first, second):
-            known = ~np.isnan(self.column(name)[rows].astype(float))
-            if weight is not None:
-                known &= ~np.isnan(self.column(weight)[rows].astype(float))
-            sides.append(rows[known])
-        below, above = self.common(*sides)
-        weights = None if weight is None else self.column(weight)[below].astype(float)
-        return paired_ratio(
-            self.column(name)[below].astype(float), self.column(name)[above].astype(float),
-            weights, cluster=self.units[below], confidence=confidence,
-        )  # fmt: skip
-
     def cut_off(self, result: Result, rows: IntArray) -> tuple[tuple[str, int], ...]:
         """Return where the run cut a result off in some rows, and in how many, sorted."""
         if result.cut_off is None:

@@ -7,7 +7,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 #: Below this many values (effective trials, for a share) an interval says little.
 FEW = 10
@@ -15,6 +15,8 @@ FEW = 10
 #: trials that hang together says little.
 FEW_UNLIKE = 5
 _RESAMPLES = 2000
+# Counts of drawn units that are in memory at once.
+_AT_ONCE = 2_000_000
 #: No interval of a logarithm is wider.
 _MOST_LOG = 700.0
 
@@ -268,6 +270,30 @@ def unseen_event(terms: FloatArray) -> tuple[float, float]:
     """Return what one event more adds to a weighted sum, on average, and to its variance."""
     once = math.fsum(terms)
     return math.fsum(terms**2) / once, math.fsum(terms**3) / once
+
+
+def resampled_ratios(below: FloatArray, above: FloatArray, resamples: int, seed: int) -> FloatArray:
+    """Return ratios of the sums of two terms over sets of units drawn with replacement.
+
+    Units without any event are drawn together: they add nothing to either sum. Those that are
+    alike in both sums are too, which leaves few kinds where weights repeat.
+    """
+    pairs = np.stack([below, above], axis=1)
+    pairs = pairs[pairs.any(axis=1)]
+    kinds, many = np.unique(pairs, axis=0, return_counts=True)
+    # The last kind: all units without an event.
+    kinds = np.concatenate([kinds, np.zeros((1, 2))])
+    many = np.append(many, len(below) - len(pairs))
+    generator = np.random.Generator(np.random.Philox(seed))
+    step = max(1, _AT_ONCE // len(kinds))
+    parts = []
+    for start in range(0, resamples, step):
+        some = min(step, resamples - start)
+        drawn: IntArray = generator.multinomial(len(below), many / len(below), size=some)
+        sums = drawn @ kinds
+        good = sums[:, 0] > 0.0
+        parts.append(sums[good, 1] / sums[good, 0])
+    return np.concatenate(parts)
 
 
 def gamma_interval(

@@ -4,8 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from dsa_des.arrays.types import IntArray
 from dsa_des.results.differences import EstimatedDifference, estimate_of
-from dsa_des.results.ratio import PairedRatio
+from dsa_des.results.ratio import PairedRatio, paired_ratio
 from dsa_des.results.record import (
     EVENT,
     RATIO,
@@ -98,9 +101,31 @@ def compare_axis(
             change = rows.difference(result, base, chosen, confidence, method)
             ratio = None
             if result.kind == EVENT:
-                ratio = rows.event_ratio(result.name, base, chosen, weight, confidence)
+                ratio = _event_ratio(rows, result.name, base, chosen, weight, confidence)
             compared.append(Compared(others, value, baseline, result, change, ratio))
     return compared
+
+
+def _event_ratio(
+    rows: Rows, name: str, first: IntArray, second: IntArray, weight: str | None, confidence: float
+) -> PairedRatio:
+    """Return how often an event happens in some rows, by how often in others: run by run.
+
+    Rows `first` are below the line, `second` above; runs that only one has do not count. The
+    result `weight` says how often each unit happens.
+    """
+    sides = []
+    for side in (first, second):
+        known = ~np.isnan(rows.column(name)[side].astype(float))
+        if weight is not None:
+            known &= ~np.isnan(rows.column(weight)[side].astype(float))
+        sides.append(side[known])
+    below, above = rows.common(*sides)
+    weights = None if weight is None else rows.column(weight)[below].astype(float)
+    return paired_ratio(
+        rows.column(name)[below].astype(float), rows.column(name)[above].astype(float),
+        weights, cluster=rows.units[below], confidence=confidence,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

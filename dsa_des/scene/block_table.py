@@ -116,3 +116,11 @@ class Block:
     cls: type[Component]
     parameters: Parameters
     options: BlockOptions = BlockOptions()
+
+    def written(self) -> dict[str, Any]:
+        """Return its table with every parameter written out, as plain TOML values."""
+        return {
+            "type": self.type_name,
+            **self.options.model_dump(mode="json", exclude_none=True, exclude_defaults=True),
+            **self.parameters.model_dump(mode="json", exclude_none=True),
+        }

@@ -5,6 +5,7 @@ import typing
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -12,7 +13,7 @@ from pydantic_core import SchemaValidator
 
 from dsa_des.block.component import Parameters, as_written
 from dsa_des.errors import Disagreements, Lines, Problem, did_you_mean, nearest
-from dsa_des.scene.keys import Key
+from dsa_des.scene.keys import Key, key_in
 from dsa_des.scene.scene_file import SceneFile
 
 
@@ -273,3 +274,27 @@ def _nested_model(annotation: Any) -> Any:
         if nested is not None:
             return nested
     return None
+
+
+def refusal(file: SceneFile, block: str, parameters: Parameters, text: str) -> Problem:
+    """Return what a block refuses at its start, at the key that its text begins with, if any.
+
+    Texts begin with keys, ``ownship: alt_m is 2e6: ...``, or with a file that a key names.
+    """
+    key: Key = ("blocks", block)
+    for parameter, path in parameters:
+        if isinstance(path, Path) and text.startswith(f"{path}: "):
+            return file.problem((*key, parameter), text)
+    value: Any = file.data["blocks"][block]
+    while begins := re.match(r"([\w.\[\]]+)(?:: | is \S+: )", text):
+        inner = key_in(value, begins[1])
+        try:
+            for part in inner:
+                value = value[part]
+        except (LookupError, TypeError):
+            break
+        key = (*key, *inner)
+        if len(key) == 2 + len(inner) and " is " in begins[0]:  # a whole sentence of its own
+            return file.problem(key, text)
+        text = text[begins.end() :]
+    return file.problem(key, text, *([] if isinstance(value, dict | list) else [value]))

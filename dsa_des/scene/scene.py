@@ -1,6 +1,5 @@
 """From a scene file to a scene that can be run, with every problem reported at once."""
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -38,7 +37,7 @@ from dsa_des.scene.checks import (
     read_text,
 )
 from dsa_des.scene.graph import build_graph, check_graph
-from dsa_des.scene.keys import Key, dotted, key_in
+from dsa_des.scene.keys import dotted
 from dsa_des.scene.overrides import (
     IN_SET,
     IN_SWAP,
@@ -48,6 +47,7 @@ from dsa_des.scene.overrides import (
     read_program,
     read_sets,
 )
+from dsa_des.scene.parameter_errors import refusal
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.scene.wiring import Wire, read_wires, with_latencies
 from dsa_des.text.safe_text import printable, shortened
@@ -215,30 +215,10 @@ class Scene:
         return Problem(str(self.path), key, message)
 
     def refused(self, name: str, text: str) -> Problem:
-        """Return what a block refuses at its start, at the key that its text begins with, if any.
-
-        Texts begin with keys, ``ownship: alt_m is 2e6: ...``, or with a file that a key names.
-        """
-        file, parameters = self._tables, self.blocks[name].parameters
-        key: Key = ("blocks", name)
-        if file is None:
-            return self.problem(dotted(key), text)
-        for parameter, path in parameters:
-            if isinstance(path, Path) and text.startswith(f"{path}: "):
-                return file.problem((*key, parameter), text)
-        value: Any = file.data["blocks"][name]
-        while begins := re.match(r"([\w.\[\]]+)(?:: | is \S+: )", text):
-            inner = key_in(value, begins[1])
-            try:
-                for part in inner:
-                    value = value[part]
-            except (LookupError, TypeError):
-                break
-            key = (*key, *inner)
-            if len(key) == 2 + len(inner) and " is " in begins[0]:  # a whole sentence of its own
-                return file.problem(key, text)
-            text = text[begins.end() :]
-        return file.problem(key, text, *([] if isinstance(value, dict | list) else [value]))
+        """Return what a block refuses at its start, at the key that its text begins with."""
+        if self._tables is None:
+            return self.problem(dotted(("blocks", name)), text)
+        return refusal(self._tables, name, self.blocks[name].parameters, text)
 
     @property
     def queues(self) -> dict[str, list[str]]:
@@ -272,14 +252,7 @@ class Scene:
                 name: parameters.model_dump(mode="json")
                 for name, parameters in self.processors.items()
             }
-        tables["blocks"] = {
-            name: {
-                "type": block.type_name,
-                **block.options.model_dump(mode="json", exclude_none=True, exclude_defaults=True),
-                **block.parameters.model_dump(mode="json", exclude_none=True),
-            }
-            for name, block in self.blocks.items()
-        }
+        tables["blocks"] = {name: block.written() for name, block in self.blocks.items()}
         return tables
 
 
@@ -370,19 +343,9 @@ def check_scene(scene_file: SceneFile) -> Scene:
     if not unsure:
         check_activity(scene_file, blocks, clocks, wires)
     scene = Scene(
-        Path(scene_file.path),
-        title,
-        description,
-        seed,
-        duration,
-        blocks,
-        wires,
-        graph,
-        ticks_per_s,
-        sections,
-        processors,
-        notes=notes,
-    )
+        Path(scene_file.path), title, description, seed, duration, blocks, wires, graph,
+        ticks_per_s, sections, processors, notes=notes,
+    )  # fmt: skip
     scene._tables = scene_file
     scene.outages = read_outages(scene_file, classes, duration)
     if CHANGES in data:

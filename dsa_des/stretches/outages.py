@@ -8,6 +8,7 @@ import numpy as np
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
+from dsa_des.record.undone import SECONDS_OUT
 from dsa_des.time.randomness import Streams
 from dsa_des.time.runs import Runs
 
@@ -98,4 +99,4 @@ class Outages:
                 out[run] += max(0, last - first)
                 reached = max(reached, last)
         seconds = np.rint(np.array([out, ends]) / self._ticks_per_s).astype(np.int64)
-        return {"it is out, counted in seconds": seconds}
+        return {SECONDS_OUT: seconds}

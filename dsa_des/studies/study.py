@@ -17,7 +17,7 @@ from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.block.registry import sourced
 from dsa_des.block.source_file import absolute
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.results.record import FigureRecord, Requirement, StopWhen, as_text, run_command
+from dsa_des.results.record import FigureRecord, Requirement, StopWhen
 from dsa_des.scene.overrides import SWAP, apply_changes, read_sets
 from dsa_des.scene.scene import Scene, check_scene
 from dsa_des.scene.scene_file import SceneFile
@@ -27,6 +27,7 @@ from dsa_des.studies.draws import Draw, member_seed, replica_seed
 from dsa_des.studies.metric import Metric, check_tables, find_metric
 from dsa_des.studies.splitting import SplitEvent, Splitting
 from dsa_des.studies.study_tables import existing_file
+from dsa_des.text.run_commands import as_text, run_command
 from dsa_des.text.safe_text import shell_line
 from dsa_des.time.randomness import key_of
 

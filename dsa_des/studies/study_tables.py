@@ -10,11 +10,12 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_valida
 
 from dsa_des.block.component import SourcedText
 from dsa_des.errors import did_you_mean
-from dsa_des.results.record import FigureKind, FigureRecord, as_text
+from dsa_des.results.record import FigureKind, FigureRecord
 from dsa_des.scene.checks import read_table
 from dsa_des.scene.keys import Key
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.axes import Axis
+from dsa_des.text.run_commands import as_text
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
 _NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when", "allocate",

@@ -225,6 +225,14 @@ def test_a_probability_of_half_a_millionth_in_a_closed_loop(tmp_path):
     assert found.high < 5.0 * found.low
 
 
+def test_distances_part_runs_that_may_still_turn(tmp_path):
+    """Where a third of the runs come near without a turn they find what the closed form says."""
+    table = {"event": "nmac", "score": "separation", "runs": 60, "levels": [10]}
+    rows = rows_of(study_of(tmp_path, 0.93, splitting=table, replicas=8))
+    found = rare(*(np.array([row[n] for row in rows]) for n in ("nmac", "nmac.unseen")), 0.95)
+    assert found.low < 0.93**21 < found.high < 2.0 * found.low
+
+
 @pytest.mark.parametrize(
     ("loses", "table", "said"),
     [
@@ -232,6 +240,9 @@ def test_a_probability_of_half_a_millionth_in_a_closed_loop(tmp_path):
         (0, {}, ["4 runs failed", "the first: the score never rises: of 10 runs of the pilot"]),
         # Nobody ever turns: the event is sure, and no stage is needed.
         (1, {}, ["nmac 1 1 to 1", "nmac.collapsed 0.00"]),
+        # Who has come to 1,200 m was told to turn long before: distances show it too late.
+        (0.5, {"score": "separation"}, ["4 runs failed", "a score of 8 none comes nearer to the "
+         "event, whatever is drawn from then on; take another splitting.score, more"]),
         # A level that nobody reaches: all have collapsed, and that is no probability of 0.
         (0.5, {"levels": [24, 0.1]}, ["nmac 0.000 0.000 to 0.", "nmac.collapsed 1.00"]),
         # One that all begin within is passed.

@@ -6,7 +6,8 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio, ratios_by_class
+from components.metrics.risk import risk_ratios_by_class
+from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio
 from dsa_des.results.record import CLASS, EVENT, NUMBER, RATIO, RatioOf, Result
 from dsa_des.results.rows import Rows
 from dsa_des.results.summary import compare_axis, summarise
@@ -75,7 +76,7 @@ def test_a_ratio_knows_no_unit_of_weight_no_order_and_no_other_class(
     # Beyond 1e154 the square of a weight is no number.
     assert all(near(of(every, unit), of(every)) for unit in (1e3, 1e-3, 1e300, 1e-300))
     assert near(of(random.permutation(1500)), of(every))
-    classes = ratios_by_class(n, m, w, kind, family, method=method, resamples=50)
+    classes = risk_ratios_by_class(n, m, w, kind, family, method=method, resamples=50)
     assert list(classes) == ["a", "bb", "c"]
     assert all(near(classes[name], of(np.flatnonzero(kind == name))) for name in classes)
 

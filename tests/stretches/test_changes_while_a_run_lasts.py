@@ -5,14 +5,18 @@ from fractions import Fraction
 import numpy as np
 import pyarrow as pa
 import pytest
+from click.testing import CliRunner
 from covering import covers
 from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 
 import dsa_des
+from dsa_des.cli import main
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
 from dsa_des.running.simulation import Simulation
+from dsa_des.time.changing_clock import ChangingClock
+from dsa_des.time.clock import ClockSpec
 
 
 def scene(*changes, tracks=False, **keys):
@@ -161,6 +165,21 @@ def test_jitter_stays_in_its_stretch_and_its_order():
     assert ((time_s[inside] >= 10.25) & (time_s[inside] < 20.25)).all()
 
 
+def test_jitter_does_not_move_a_scan_over_the_border_of_its_stretch():
+    # All draws are as early, or as late, as jitter gets: 0.45 periods of 500 ticks. Scans 21 to 40
+    # on the grid, 10,500 to 20,000, are those of the stretch; its first and last would leave it.
+    still, jitters = ClockSpec(Fraction(2)), ClockSpec(Fraction(2), jitter_s=1.0)
+    for draw, moved in ((-9.0, -225), (9.0, 225)):
+        clock = ChangingClock(
+            still, [(10_450, jitters), (20_050, still)], 1000, lambda k, d=draw: np.full(len(k), d)
+        )
+        expected = np.arange(0, 30_000, 500)
+        expected[21:41] += moved
+        expected[21], expected[40] = max(expected[21], 10_450), min(expected[40], 20_049)
+        assert clock.ticks(np.arange(60)).tolist() == expected.tolist()
+        assert clock.between(10_450, 20_050)[0].tolist() == list(range(21, 41))
+
+
 def test_what_is_remembered_goes_on_in_any_window_and_beside_other_runs():
     changes = [
         change("blocks.radar.range_error_m", 60, from_s=8, to_s=12),
@@ -251,6 +270,14 @@ def test_a_run_folder_says_what_changed():
     again = dsa_des.load_scene(changed.resolved())
     assert again.stretches[0].from_s == Fraction(1, 3)
     assert [one.written() for one in again.changes] == [one.written() for one in changed.changes]
+
+
+def test_a_run_prints_what_changes_when(tmp_path):
+    path = tmp_path / "changes.toml"
+    path.write_text(to_toml(scene(change("blocks.radar.enabled", False)).resolved()))
+    words = ["run", str(path), "--out", str(tmp_path / "out"), "--no-figures"]
+    printed = CliRunner().invoke(main, words, catch_exceptions=False).stdout
+    assert "from 13 s to 27 s: blocks.radar.enabled = false\n" in printed
 
 
 def test_costs_are_of_scenes_that_stay_as_they_are(tmp_path):

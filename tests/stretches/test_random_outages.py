@@ -8,6 +8,7 @@ from test_changes_while_a_run_lasts import change, scans_of, scene
 
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.errors import SceneError
+from dsa_des.record.undone import undone_sentences
 from dsa_des.scene.block_table import Outage
 from dsa_des.stretches.outages import Outages
 from dsa_des.time.randomness import Streams
@@ -62,6 +63,19 @@ def test_a_block_that_is_out_does_not_scan_in_any_window_and_beside_other_runs()
     assert never["scans"].filter(kept).equals(whole["scans"])
 
 
+def test_what_comes_over_the_wires_of_a_block_that_is_out_is_lost():
+    late = ["traffic -> transform -> gate", "gate -> radar",
+            {"from": "radar", "to": "fusion", "delay_s": 0.3}]  # fmt: skip
+    failing = scene(wires=late, outages=[outage("fusion")])
+    simulation, tables = tables_of(failing)
+    _, never = tables_of(scene(wires=late))
+    arrived = scans_of(never["fused"])
+    at = RunTicks.of_run(0, np.rint(np.array(arrived) * 1e9).astype(np.int64))
+    up = simulation.timeline.outages("fusion").up(at)
+    assert 0.1 < up.mean() < 0.9
+    assert tables["fused"].equals(never["fused"].filter(up))
+
+
 @covers("restart_s", of=("[outages]",))
 def test_a_restart_takes_its_time():
     def missing(**keys):
@@ -82,9 +96,12 @@ def test_what_fails_together_is_out_together_and_draws_by_its_name():
     assert (radar == tracker).all()
     other, _ = tables_of(scene(outages=[outage("radar", name="other")]))
     assert not np.array_equal(spans_s(other.timeline.outages("radar")), radar)
-    said = simulation.timeline.outages("radar").undone()["it is out, counted in seconds"]
+    said = simulation.timeline.outages("radar").undone()["seconds out"]
     out_s = sum(np.minimum(last, 40e9) - np.minimum(first, 40e9) for first, last in radar) / 1e9
     assert said.tolist() == [[round(out_s)], [40]]
+    assert undone_sentences({"radar": {"seconds out": (3, 600)}}) == [
+        "radar: seconds out: 3 of 600 (0.5 %)"
+    ]  # though a block that lacks something so seldom is not worth a sentence
 
 
 def test_wrong_outages_are_said():
