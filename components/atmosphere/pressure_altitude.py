@@ -47,7 +47,7 @@ def pressure_altitude_m(
     )
     standard = (qnh == STANDARD_HPA) & (offset == 0.0)
     drop = _log_drop(height, offset) - np.log(qnh / STANDARD_HPA)
-    return unflatten(np.where(standard, height, _height_of(drop, np.zeros_like(drop))), shape)
+    return unflatten(np.where(standard, height, _height_of(drop)), shape)
 
 
 def _log_drop(height: Any, offset: Any) -> Any:
@@ -59,10 +59,9 @@ def _log_drop(height: Any, offset: Any) -> Any:
     return drop + _HYDROSTATIC_K_M * (height - below) / (_TROPOPAUSE_K + offset)
 
 
-def _height_of(drop: Any, offset: Any) -> Any:
-    """Return the heights at which the logarithm of pressure has fallen by so much."""
-    warmth = _SEA_LEVEL_K + offset
-    tropopause = _log_drop(np.full_like(drop, _TROPOPAUSE_M), offset)
+def _height_of(drop: Any) -> Any:
+    """Return the heights at which the logarithm of pressure fell by so much in standard air."""
+    tropopause = _log_drop(_TROPOPAUSE_M, 0.0)
     below = np.minimum(drop, tropopause)
-    height = -warmth / _LAPSE_K_M * np.expm1(-below * _LAPSE_K_M / _HYDROSTATIC_K_M)
-    return height + (drop - below) * (_TROPOPAUSE_K + offset) / _HYDROSTATIC_K_M
+    height = -_SEA_LEVEL_K / _LAPSE_K_M * np.expm1(-below * _LAPSE_K_M / _HYDROSTATIC_K_M)
+    return height + (drop - below) * _TROPOPAUSE_K / _HYDROSTATIC_K_M

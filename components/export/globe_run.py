@@ -50,7 +50,7 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Seen:
+class DetectedPlace:
     """A detection with a range: who detected whom, when and where (as in `Course`)."""
 
     sensor: str
@@ -73,7 +73,7 @@ class GlobeRun:
     flights: list[Course]
     tracks: list[Course]
     alerts: list[Course]
-    seen: list[Seen]
+    seen: list[DetectedPlace]
     marks: Mapping[str, Mark]
 
 
@@ -132,7 +132,7 @@ def _about(alert: Alert, flights: Sequence[Course], tracks: Sequence[Course]) ->
     return max(mine, key=lambda one: float(one.time_s[-1]), default=None)
 
 
-def seen_positions(run: RecordedTables) -> Iterator[Seen]:
+def seen_positions(run: RecordedTables) -> Iterator[DetectedPlace]:
     """Give the detections that have a range."""
     if "detections" not in run.tables:
         return
@@ -148,7 +148,7 @@ def seen_positions(run: RecordedTables) -> Iterator[Seen]:
     sensors, targets = (run.texts("detections", name) for name in ("block", "target"))
     rows = zip(*(part.tolist() for part in (there, number[0], lon, lat, alt)), strict=True)
     for row, at_s, *position in rows:
-        yield Seen(sensors[row] or "", targets[row] or "", at_s, tuple(position))
+        yield DetectedPlace(sensors[row] or "", targets[row] or "", at_s, tuple(position))
 
 
 def _estimated(run: RecordedTables) -> Iterator[Course]:

@@ -5,7 +5,7 @@ from xml.sax.saxutils import escape
 
 from components.display.recorded_run import RecordedTables
 from components.display.symbols import LEVELS_ON_DARK
-from components.export.globe_run import Course, GlobeRun, Seen, globe_run, when
+from components.export.globe_run import Course, DetectedPlace, GlobeRun, globe_run, when
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError
 from dsa_des.text.safe_text import printable
@@ -138,7 +138,7 @@ def _coordinates(position: FloatArray, geoid_m: float) -> Iterator[str]:
         yield f"<gx:coord>{lon} {lat} {alt - geoid_m}</gx:coord>"
 
 
-def _points(seen: Sequence[Seen], geoid_m: float) -> list[str]:
+def _points(seen: Sequence[DetectedPlace], geoid_m: float) -> list[str]:
     lines = []
     for one in seen:
         lon, lat, alt = one.position

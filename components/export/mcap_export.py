@@ -14,7 +14,13 @@ import numpy as np
 
 from components.display.recorded_run import RecordedTables
 from components.estimation.frame import pose_in_frame
-from components.export.globe_run import DETECTION_LASTS_S, START, Seen, marks_in, seen_positions
+from components.export.globe_run import (
+    DETECTION_LASTS_S,
+    START,
+    DetectedPlace,
+    marks_in,
+    seen_positions,
+)
 from components.geometry import line_of_sight_ned
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors.extras import library
@@ -165,7 +171,7 @@ def _message(topic: str, name: str, at_ns: int, content: dict[str, Any]) -> _Mes
 
 
 def _ball(
-    number: int, end: Seen, offset: dict[str, float], painted: str
+    number: int, end: DetectedPlace, offset: dict[str, float], painted: str
 ) -> tuple[int, dict[str, Any]]:
     when = _instant(end.time_s)
     colour = [int(painted[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]

@@ -259,4 +259,6 @@ def roster_of(
             raise ValueError(f"aircraft.{name}: {what} has no such aircraft"
                              f"{did_you_mean(name, names)}")  # fmt: skip
     targets = [(name, others.get(name, default)) for name in names]
-    return Roster.of(targets, (OWNSHIP, others.get(own, default)))
+    # An address said for intruders is theirs alone.
+    own_craft = others.get(own, default.model_copy(update={"icao_address": None}))
+    return Roster.of(targets, (OWNSHIP, own_craft))

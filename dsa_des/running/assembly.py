@@ -166,7 +166,7 @@ class Assembly:
         """Return what is offered over a wire, as what carries the receiver has it."""
         offer = self._asked(components[wire.source], "offer", wire.output)
         carrying = components[wire.target].context.platform
-        if carrying in self._sources.get(wire.source, ()):
+        if offer is not None and carrying in self._sources.get(wire.source, ()):
             return offer.seen_from(carrying)
         return offer
 

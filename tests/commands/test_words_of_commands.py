@@ -100,8 +100,8 @@ def test_a_comparison_changes_all_that_is_compared():
 def test_a_kind_of_blocks_and_one_key():
     listed = call("components", "radar").stdout
     assert "radar.swerling" in listed and "optical.eo" not in listed
-    (row,) = call("components", "radar.swerling", "scan_rate_hz").stdout.splitlines()[1:]
-    assert "Hz" in row and "required" in row
+    row = call("components", "radar.swerling", "scan_rate_hz").stdout.splitlines()[1]
+    assert row.startswith("  scan_rate_hz") and "Hz" in row and "required" in row
     inner = call("components", "radar.swerling", "calibrate").stdout
     assert "calibrate.rcs_dbsm" in inner and "power_w" not in inner
 

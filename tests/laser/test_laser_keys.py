@@ -156,6 +156,6 @@ def test_a_wire_is_met_in_pieces_where_it_hangs():
              math.sin(row["elevation_rad"])]
         )  # fmt: skip
         np.testing.assert_allclose(found, middle, atol=0.1)
-    for piece in dsa_des.load_scene(scene).blocks["traffic"].parameters.targets:
+    for piece in dsa_des.load_scene(scene).blocks["traffic"].parameters.targets(None):
         assert (piece.laser.wire_diameter_mm, piece.laser.reflectivity) == (7.0, 0.35)
         assert piece.rcs_dbsm == -13.0 and piece.eo.side_m2 == piece.ir.back_m2 == 0.0

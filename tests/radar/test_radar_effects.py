@@ -186,7 +186,7 @@ def test_each_target_is_lit_at_its_own_instant(scene):
 def test_targets_that_are_not_offered(scene, monkeypatch):
     """Traffic that offers nothing may bring anything; a wrong offer is refused, not believed."""
     from components.aircraft.aircraft import Aircraft, Roster
-    from components.traffic.source import TrafficSource
+    from components.traffic.source import KnownTraffic, TrafficSource
     from dsa_des.errors import BlockFailure
 
     path = scene(swerling=0)
@@ -196,7 +196,7 @@ def test_targets_that_are_not_offered(scene, monkeypatch):
     plan = plan_of(path)
     assert plan["RCS fluctuation"].because == plan["aspect RCS"].because == because
     assert same(offered, simulate(path)[1])
-    others = Roster.of([("somebody else", Aircraft())])
+    others = KnownTraffic(Roster.of([("somebody else", Aircraft())]), None)
     monkeypatch.setattr(TrafficSource, "offer", lambda self, port: others)
     with pytest.raises(BlockFailure, match="not offered"):
         simulate(path)
