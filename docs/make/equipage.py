@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
+import pandas as pd  # type: ignore[import-untyped]
 
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say
