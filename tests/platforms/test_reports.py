@@ -1,4 +1,4 @@
-"""What a run says of each platform: its own blocks, whom it comes near, and whose tracks are true."""
+"""What a run says of each platform: its blocks, whom it comes near, and which tracks are true."""
 
 import numpy as np
 import pymap3d
