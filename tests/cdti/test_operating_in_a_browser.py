@@ -85,6 +85,7 @@ def places(page):
             if name != "ready":
                 found[size[0], name] = tuple(one.bounding_box().values())
     page.set_viewport_size({"width": 1280, "height": 800})
+    page.evaluate(DRAWN)
     return found
 
 
@@ -109,7 +110,7 @@ def test_buttons_stay_where_they_are_whatever_is_said(operated):
 
 def test_what_steers_is_within_reach_of_a_hand(operated):
     page = operated.page
-    page.set_viewport_size({"width": 390, "height": 664})  # what a telephone's browser leaves
+    operated.resize(390, 664)  # what a telephone's browser leaves
     for name in ("verify", "reject", "left", "right", "up", "down"):
         box = page.locator(f"#{name}").bounding_box()
         assert box["x"] >= 0 and box["x"] + box["width"] <= 390
@@ -117,13 +118,13 @@ def test_what_steers_is_within_reach_of_a_hand(operated):
         assert box["height"] >= 24  # WCAG 2.2, 2.5.8
     wide = page.evaluate("document.documentElement.scrollWidth")
     assert wide <= 390
-    page.set_viewport_size({"width": 1280, "height": 800})
+    operated.resize(1280, 800)
 
 
 @pytest.mark.parametrize("width", [1280, 390])
 def test_labels_lie_on_nothing_and_inside_the_display(operated, width):
     page = operated.page
-    page.set_viewport_size({"width": width, "height": 800})
+    operated.resize(width, 800)
     seen = operated.when("App.state().symbols.length >= 2 && App.state().labels.length >= 3")
     boxes = page.evaluate("(({ clientWidth, clientHeight }) => [clientWidth, clientHeight])(scope)")
     for one in seen["labels"]:
@@ -136,7 +137,7 @@ def test_labels_lie_on_nothing_and_inside_the_display(operated, width):
         box = {"left": one["x"] - half, "right": one["x"] + half, "top": one["y"] - half,
                "low": one["y"] + half}  # fmt: skip
         assert not [name for name in named if overlaps(name, box)]
-    page.set_viewport_size({"width": 1280, "height": 800})
+    operated.resize(1280, 800)
 
 
 def test_the_ownship_s_speed_height_and_climb_are_said_in_the_chosen_units(operated):
