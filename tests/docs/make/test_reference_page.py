@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from docs.make.reference import page, recorded_tables
+from docs.make.reference.__main__ import page, recorded_tables
 from dsa_des.block.entry_points import registered
 from dsa_des.block.recorded_columns import LEADING
 from dsa_des.block.registry import find, section_models

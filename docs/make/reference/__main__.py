@@ -11,7 +11,7 @@ from typing import Any
 
 from components.formats.csv_file import csv_columns
 from components.formats.daa_file import daa_columns
-from docs.make.parameter_tables import MARK, ParameterTables, mark_changing
+from docs.make.reference.parameter_tables import MARK, ParameterTables, mark_changing
 from dsa_des.block.entry_points import registered
 from dsa_des.block.message import Column, Message
 from dsa_des.block.recorded_columns import LEADING
