@@ -64,6 +64,7 @@ def operated(browser, tmp_path_factory):
         screen.quiet = places(screen.page)
         screen.page.keyboard.press("Enter")
         screen.state()
+        screen.resize(1280, 800)  # what was hidden at the width of a hand is drawn again
         yield screen
         session.stop()
         screen.close()
@@ -105,6 +106,7 @@ def test_buttons_stay_where_they_are_whatever_is_said(operated):
     page.keyboard.press("x")
     operated.when("App.said.some(one => one.decision === 'rejected')")
     assert places(page) == alerted
+    operated.resize(1280, 800)
     page.keyboard.press("u")
 
 
@@ -289,13 +291,15 @@ def test_an_alert_that_was_rejected_stays_with_its_contact(operated):
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_green_stands_for_one_thing(operated, theme):
     page = operated.page
-    page.evaluate("name => { document.documentElement.dataset.theme = name; }", theme)
+    chosen = page.evaluate("document.documentElement.dataset.theme")
+    dress = "name => { document.documentElement.dataset.theme = name; }"
+    page.evaluate(dress, theme)
     script = "n => getComputedStyle(document.documentElement).getPropertyValue('--' + n).trim()"
     names = ("own", "traffic", "eo", "ir", "radar", "recovery", "caution", "warning",
              "symbol-caution", "symbol-warning", "ink", "faint", "line")  # fmt: skip
-    green = []
-    for name in names:
-        colour = page.evaluate(script, name)
+    green, colours = [], {name: page.evaluate(script, name) for name in names}
+    page.evaluate(dress, chosen)  # others compare what is painted with it
+    for name, colour in colours.items():
         red_green_blue = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
         hue, _, strength = colorsys.rgb_to_hsv(*red_green_blue)
         if strength > 0.2 and 70 <= 360 * hue <= 170:
