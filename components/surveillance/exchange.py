@@ -75,8 +75,8 @@ class PositionExchange(Component):
         position = _way(own, here[1])
         roster = states.roster
         own_key = target_keys((roster.own_name,))
-        mine = self._errors_of(wake, np.broadcast_to(own_key, (len(wake), 1)))
-        theirs = self._errors_of(
+        mine = self._fix_errors(wake, np.broadcast_to(own_key, (len(wake), 1)))
+        theirs = self._fix_errors(
             wake, np.broadcast_to(roster.keys_of(states.columns), states.present.shape)
         )
         row, column = states.present.nonzero()
@@ -109,7 +109,7 @@ class PositionExchange(Component):
             roster,
         )
 
-    def _errors_of(self, wake: Wake, keys: AnyArray) -> list[FloatArray]:
+    def _fix_errors(self, wake: Wake, keys: AnyArray) -> list[FloatArray]:
         """Return errors of position and of velocity, (2, rows, aircraft) each: east and north."""
         instant_ns = nanosecond_of(wake.ticks, wake.ticks_per_s)
         run, shape = np.repeat(wake.run, keys.shape[1]), (2, *keys.shape)

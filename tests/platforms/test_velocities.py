@@ -127,6 +127,19 @@ def test_it_flies_to_its_goal_and_stops_there():
     assert ahead_m == pytest.approx(300.0, abs=1.5)
 
 
+@covers("scan_rate_hz", "offset_s", "rate_error_ppm", "jitter_s", of=("surveillance.exchange",))
+def test_fixes_are_told_by_the_clock():
+    def told(**keys):
+        clock = {f"blocks.exchange.{key}": value for key, value in keys.items()}
+        alerts = tables_of(scene(duration_s=3, **clock))[1]["alerts"]
+        return [row["time_s"] for row in of_block(alerts, "exchange")]
+
+    assert told(scan_rate_hz=2, offset_s=0.25) == [0.25, 0.75, 1.25, 1.75, 2.25, 2.75]
+    assert told(rate_error_ppm=-100_000) == pytest.approx([0.0, 1.0 / 0.9, 2.0 / 0.9])
+    late = np.array(told(jitter_s=0.1))
+    assert len(late) == 3 and (late != np.round(late)).any() and np.ptp(late - [0, 1, 2]) < 0.6
+
+
 def test_they_are_the_same_in_any_window_and_beside_other_runs():
     same_in_any_window(scene(duration_s=20))
     same_as_alone(replicas_of(scene(duration_s=12), {}, {"blocks.exchange.position_m": 10}))
