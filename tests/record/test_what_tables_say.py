@@ -6,7 +6,7 @@ import json
 import pyarrow.parquet as pq
 
 import dsa_des
-from docs.make.reference import recorded_tables
+from docs.make.reference.__main__ import recorded_tables
 from dsa_des.block.recorded_columns import LEADING
 
 QUICK = {"sets": ["record.looks=true"], "duration_s": 6, "seed": 11}
