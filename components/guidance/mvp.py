@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from components.geometry import enu_to_geodetic, line_of_sight_ned
-from components.guidance.potential import Others, Separation, conflicts, may_resume, pushed
+from components.guidance.potential import Others, KeptApart, conflicts, may_resume, pushed
 from components.messages.alerts import AlertLevels
 from components.messages.reach import FarthestLook
 from components.messages.steering import Velocities
@@ -74,7 +74,7 @@ class VoltagePotential(Component):
 
     def setup(self) -> None:
         """Start without having seen anybody."""
-        self._kept = Separation(self.p.radius_m, self.p.margin, self.p.lookahead_s)
+        self._kept = KeptApart(self.p.radius_m, self.p.margin, self.p.lookahead_s)
         #: By run: which others are active, first track, goal, and the last velocity commanded.
         self._known = KeyedTable.empty({"replica": int})
 

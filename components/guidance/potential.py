@@ -16,7 +16,7 @@ _LEAST_MISS_M, _LEAST_TIME_S, _LEAST_SPEED2 = 0.1, 1e-6, 1e-9
 _PARALLEL_RAD = np.radians(30.0)
 
 
-class Separation(NamedTuple):
+class KeptApart(NamedTuple):
     """What is to be kept: a radius, times so much where one steers, within a time."""
 
     radius_m: float
@@ -39,7 +39,7 @@ def closest(others: Others) -> tuple[FloatArray, FloatArray]:
     return time_s, others.position_m + others.velocity_mps * time_s
 
 
-def conflicts(others: Others, kept: Separation) -> BoolArray:
+def conflicts(others: Others, kept: KeptApart) -> BoolArray:
     """Return which others come within the radius in time, (n, others); NaN never does."""
     speed2 = (others.velocity_mps**2).sum(axis=0)
     time_s, miss = closest(others)
@@ -49,7 +49,7 @@ def conflicts(others: Others, kept: Separation) -> BoolArray:
     return np.asarray(meets & (speed2 >= _LEAST_SPEED2))
 
 
-def may_resume(others: Others, own_mps: FloatArray, kept: Separation) -> BoolArray:
+def may_resume(others: Others, own_mps: FloatArray, kept: KeptApart) -> BoolArray:
     """Return which others are past, apart, and not beside one on nearly one's own track.
 
     `own_mps` is one's own velocity (2, n).
@@ -63,7 +63,7 @@ def may_resume(others: Others, own_mps: FloatArray, kept: Separation) -> BoolArr
     return np.asarray(past & (range_m >= kept.radius_m) & ~beside)
 
 
-def pushed(others: Others, own_mps: FloatArray, pushing: BoolArray, kept: Separation) -> FloatArray:
+def pushed(others: Others, own_mps: FloatArray, pushing: BoolArray, kept: KeptApart) -> FloatArray:
     """Return the velocity (2, n) that some others push one's own to.
 
     Notes

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from components.guidance.potential import Others, Separation, conflicts, may_resume, pushed
+from components.guidance.potential import Others, KeptApart, conflicts, may_resume, pushed
 
-KEPT = Separation(50.0, 1.05, 120.0)
+KEPT = KeptApart(50.0, 1.05, 120.0)
 
 
 def plain_conflict(rx, ry, ux, uy):
