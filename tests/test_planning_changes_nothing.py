@@ -222,6 +222,9 @@ class PathCells:
     def __init__(self, range_m: np.ndarray, own_alt_m: np.ndarray, alt_m: np.ndarray) -> None:
         self.range_m, self.alt_m, self._own = range_m, alt_m, own_alt_m
 
+    def __len__(self) -> int:
+        return len(self.range_m)
+
     def of_row(self, name: str) -> np.ndarray:
         assert name == "own_alt_m"
         return self._own

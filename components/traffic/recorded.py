@@ -176,6 +176,7 @@ class RecordedTraffic(TrafficSource):
         self.own = self.own_flight()
         others = [craft for craft in self.content.aircraft if craft is not self.own]
         self.targets = SampledFleet(others)
+        self._sampled_s = [craft.sample_times_s for craft in others]
         self.roster = roster_of(
             self.own.name, [target.name for target in others], parameters.intruder,
             parameters.aircraft, self.file_names(),
@@ -222,12 +223,15 @@ class RecordedTraffic(TrafficSource):
         return max(Fraction(repr(float(last))), Fraction(1, 10**9))
 
     def sample_times(self) -> list[SampleTimes]:
-        """Return the sample times of the ownship where it has some, and those of each target."""
+        """Return the sample times of the ownship where it has some, and those of each target.
+
+        They are the file's, also of who is steered.
+        """
         times: list[SampleTimes] = []
         if isinstance(self.own, SampledTrajectory):
             times.append(KnownTimes(self.own.sample_times_s))
-        if self.targets:
-            times.append(KnownTimes(*(target.sample_times_s for target in self.targets)))
+        if self._sampled_s:
+            times.append(KnownTimes(*self._sampled_s))
         return times
 
     def warnings(self) -> list[str]:

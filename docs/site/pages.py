@@ -16,6 +16,7 @@ def on_files(files: Files, config: Any) -> Files:
         files.append(File.generated(config, f"assets/{part}", content=text))
     page = files.get_file_from_path(_PAGE)
     for name, text in _blocks(page.content_string):
+        text = text.replace("](#", f"](../../{_PAGE}#")
         content = f"---\nhide: [toc]\n---\n# {name}\n{text}\n[All block types](../../{_PAGE})\n"
         files.append(File.generated(config, f"{_FOLDER}/{name}.md", content=content))
     return files

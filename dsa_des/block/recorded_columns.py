@@ -51,6 +51,9 @@ LEADING = {
     ),
     "time_s": Column("s", "", "the same instant since the start of the run"),
 }
+#: Behind these, where blocks of a scene are on several platforms.
+PLATFORM = "platform"
+ON_PLATFORM = {PLATFORM: Column("", "", "what carries that block", "text")}
 
 
 @dataclass(frozen=True)

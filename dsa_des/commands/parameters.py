@@ -30,7 +30,7 @@ def parameter_rows(
     """Return name, type with bounds, unit, default and meaning of every parameter."""
     rows, changing = [], may_change(model)
     for name, info in model.model_fields.items():
-        nested = _nested(info.annotation)
+        nested = nested_models(info.annotation)
         kind = "table" if nested else _type_name(info.annotation)
         if nested and typing.get_origin(info.annotation) is list:
             kind = "list of tables"
@@ -50,12 +50,13 @@ def parameter_rows(
     return rows
 
 
-def _nested(annotation: Any) -> list[type[BaseModel]]:
+def nested_models(annotation: Any) -> list[type[BaseModel]]:
+    """Return the models of tables that a field holds, in the order in which it names them."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     models: list[type[BaseModel]] = []
     for argument in typing.get_args(annotation):
-        models += [model for model in _nested(argument) if model not in models]
+        models += [model for model in nested_models(argument) if model not in models]
     return models
 
 

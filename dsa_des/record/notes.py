@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from dsa_des.block.message import Column, Message, derived
-from dsa_des.block.recorded_columns import LEADING
+from dsa_des.block.recorded_columns import LEADING, ON_PLATFORM
 from dsa_des.record.version import __version__
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def notes_of(
     rows_of: dict[str, dict[str, str]] = {}
     for message in messages:
         for table, columns in message.recorded.items():
-            meanings.setdefault(table, dict(LEADING)).update(columns)
+            meanings.setdefault(table, {**LEADING, **ON_PLATFORM}).update(columns)
         rows_of.setdefault(message.row_table, {}).update(derived(message).for_entries)
     run = {
         "dsa_des_version": __version__,

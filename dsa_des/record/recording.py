@@ -19,7 +19,7 @@ from dsa_des.arrays.column_values import (
 from dsa_des.arrays.run_ticks import RunTicks, no_runs
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import Message, rows_of
-from dsa_des.block.recorded_columns import LEADING
+from dsa_des.block.recorded_columns import LEADING, PLATFORM
 from dsa_des.errors import nearest
 from dsa_des.record.sinks import Sink
 from dsa_des.time.runs import Runs
@@ -119,6 +119,7 @@ class Recorder:
         self._wanted = wanted
         self._ticks_per_s = 1
         self._schemas: dict[str, Schema] = {}
+        self._platforms: Mapping[str, str] = {}
         self._pending: dict[str, list[tuple[str, Columns]]] = {}
         #: What came since `_read`, and of it what more messages of a block may join.
         self._groups: list[_AlikeMessages] = []
@@ -142,16 +143,19 @@ class Recorder:
         ends: Runs | None = None,
         *,
         replicas: bool = False,
+        platforms: Mapping[str, str] | None = None,
     ) -> None:
         """Learn what the run's messages record; called once, before the run.
 
-        With `replicas` every table begins with the number of the run. Rows of when a run has ended,
-        as `ends` knows when they are handed on, are left out.
+        With `replicas` every table begins with the number of the run; with `platforms` the platform
+        of each row's block is a column. Rows of when a run has ended, as `ends` knows when they
+        are handed on, are left out.
         """
-        self._ends = ends
+        self._ends, self._platforms = ends, platforms or {}
         self._ticks_per_s = ticks_per_s
         self._replicas = replicas
         leading = {"replica": "int64", **_LEADING} if replicas else _LEADING
+        leading = {**leading, PLATFORM: "text"} if platforms else leading
         for message in messages:
             for table, columns in message.recorded.items():
                 kinds = {name: column.kind for name, column in columns.items()}
@@ -313,7 +317,9 @@ class Recorder:
         if name == "time_s":
             return Instants(instants.tick, self._ticks_per_s)
         if kind == "text":
-            text = self._texts.setdefault((table, name), _TextCodes(name))
+            says: dict[str, Callable[[str], str | None]]
+            says = {"block": str, PLATFORM: self._platforms.get}
+            text = self._texts.setdefault((table, name), _TextCodes(name, says.get(name)))
             codes = _joined([text.codes(block, columns) for block, columns in pieces], order)
             return Text(codes, text.names)
         given: list[Any] = [columns.get(name) for _, columns in pieces]
@@ -355,8 +361,9 @@ def _instants(columns: Columns) -> RunTicks:
 class _TextCodes:
     """The names that a text column has held so far, and what its pieces' own codes become."""
 
-    def __init__(self, column: str) -> None:
-        self._column = column
+    def __init__(self, column: str, of_block: Callable[[str], str | None] | None) -> None:
+        #: Of each block what its rows hold; None of columns that messages fill.
+        self._column, self._of_block = column, of_block
         self._code: dict[str, int] = {}
         #: By identity of a tuple of names, which is kept so that the identity stays its own.
         self._lookups: dict[int, tuple[tuple[str, ...], AnyArray]] = {}
@@ -365,8 +372,10 @@ class _TextCodes:
     def codes(self, block: str, columns: Columns) -> AnyArray:
         """Return one piece's codes into our names; -1 is null."""
         count = len(columns["tick"])
-        if self._column == "block":
-            return constant(self._lookup((block,))[0], count, "int32")
+        if self._of_block is not None:
+            name = self._of_block(block)
+            code = -1 if name is None else self._lookup((name,))[0]
+            return constant(code, count, "int32")
         text = columns.get(self._column)
         if text is None:
             return constant(-1, count, "int32")

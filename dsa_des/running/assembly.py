@@ -123,9 +123,9 @@ class Assembly:
 
     def _put_on_platforms(self) -> None:
         """Tell every block what carries it, which no change alters."""
-        self._platforms = platforms_of(self._scene, self._sources)
+        self.platforms = platforms_of(self._scene, self._sources)
         for components in self.stretches:
-            for name, platform in self._platforms.items():
+            for name, platform in self.platforms.items():
                 components[name].context.platform = platform
 
     def _offer_down_the_chain(self, number: int) -> None:

@@ -264,6 +264,8 @@ class Node:
             idle = np.array([not came])
         waiting = idle is not None and bool(idle[0])
         if not waiting and self.processor is not None and self.processor.refuses(self.name):
+            for wire in self._trigger_wires:
+                wire.collect(tick + 1)  # what came to be worked on now is left out with it
             return
         self._run(_now(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
 

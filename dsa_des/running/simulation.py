@@ -123,6 +123,8 @@ class Simulation:
             scene, timeline, recorder, simulate_everything, wrap_effect, grain.rewinds
         )
         self.components: Mapping[str, Component] = assembly.components
+        #: What carries each block, where blocks are on several platforms; else nothing.
+        self.platforms = assembly.platforms if len(set(assembly.platforms.values())) > 1 else {}
         #: The blocks of each stretch of time between two changes, and what became of their effects.
         self.stretches, self.plans = assembly.stretches, assembly.plans
         self.unheard = assembly.unheard
@@ -277,7 +279,7 @@ class Simulation:
         if self.recorder is not None:
             self.recorder.open(
                 self.recorded_messages(), self.ticks_per_s, self.runs,
-                replicas=self.timeline.says_replica,
+                replicas=self.timeline.says_replica, platforms=self.platforms,
             )  # fmt: skip
 
     def _recorded(self, call: Callable[..., None], *arguments: Any) -> None:

@@ -51,6 +51,15 @@ class Screen:
         self.page.goto(session.address)
         self.when("App.state().role !== ''")
 
+    def resize(self, width, height):
+        """Give it another size, and wait until all is drawn as large as it is shown."""
+        self.page.set_viewport_size({"width": width, "height": height})
+        self.when(
+            f"innerWidth === {width} && innerHeight === {height} && App.state() &&"
+            " [...document.querySelectorAll('canvas')].every((one) => !one.clientWidth ||"
+            " one.width === Math.round(one.clientWidth * devicePixelRatio))"
+        )
+
     def state(self):
         """What it shows once the scene stands: nothing of it changes until that goes on."""
 

@@ -64,6 +64,7 @@ def operated(browser, tmp_path_factory):
         screen.quiet = places(screen.page)
         screen.page.keyboard.press("Enter")
         screen.state()
+        screen.resize(1280, 800)  # what was hidden at the width of a hand is drawn again
         yield screen
         session.stop()
         screen.close()
@@ -85,6 +86,7 @@ def places(page):
             if name != "ready":
                 found[size[0], name] = tuple(one.bounding_box().values())
     page.set_viewport_size({"width": 1280, "height": 800})
+    page.evaluate(DRAWN)
     return found
 
 
@@ -104,12 +106,13 @@ def test_buttons_stay_where_they_are_whatever_is_said(operated):
     page.keyboard.press("x")
     operated.when("App.said.some(one => one.decision === 'rejected')")
     assert places(page) == alerted
+    operated.resize(1280, 800)
     page.keyboard.press("u")
 
 
 def test_what_steers_is_within_reach_of_a_hand(operated):
     page = operated.page
-    page.set_viewport_size({"width": 390, "height": 664})  # what a telephone's browser leaves
+    operated.resize(390, 664)  # what a telephone's browser leaves
     for name in ("verify", "reject", "left", "right", "up", "down"):
         box = page.locator(f"#{name}").bounding_box()
         assert box["x"] >= 0 and box["x"] + box["width"] <= 390
@@ -117,13 +120,13 @@ def test_what_steers_is_within_reach_of_a_hand(operated):
         assert box["height"] >= 24  # WCAG 2.2, 2.5.8
     wide = page.evaluate("document.documentElement.scrollWidth")
     assert wide <= 390
-    page.set_viewport_size({"width": 1280, "height": 800})
+    operated.resize(1280, 800)
 
 
 @pytest.mark.parametrize("width", [1280, 390])
 def test_labels_lie_on_nothing_and_inside_the_display(operated, width):
     page = operated.page
-    page.set_viewport_size({"width": width, "height": 800})
+    operated.resize(width, 800)
     seen = operated.when("App.state().symbols.length >= 2 && App.state().labels.length >= 3")
     boxes = page.evaluate("(({ clientWidth, clientHeight }) => [clientWidth, clientHeight])(scope)")
     for one in seen["labels"]:
@@ -136,7 +139,7 @@ def test_labels_lie_on_nothing_and_inside_the_display(operated, width):
         box = {"left": one["x"] - half, "right": one["x"] + half, "top": one["y"] - half,
                "low": one["y"] + half}  # fmt: skip
         assert not [name for name in named if overlaps(name, box)]
-    page.set_viewport_size({"width": 1280, "height": 800})
+    operated.resize(1280, 800)
 
 
 def test_the_ownship_s_speed_height_and_climb_are_said_in_the_chosen_units(operated):
@@ -288,13 +291,15 @@ def test_an_alert_that_was_rejected_stays_with_its_contact(operated):
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_green_stands_for_one_thing(operated, theme):
     page = operated.page
-    page.evaluate("name => { document.documentElement.dataset.theme = name; }", theme)
+    chosen = page.evaluate("document.documentElement.dataset.theme")
+    dress = "name => { document.documentElement.dataset.theme = name; }"
+    page.evaluate(dress, theme)
     script = "n => getComputedStyle(document.documentElement).getPropertyValue('--' + n).trim()"
     names = ("own", "traffic", "eo", "ir", "radar", "recovery", "caution", "warning",
              "symbol-caution", "symbol-warning", "ink", "faint", "line")  # fmt: skip
-    green = []
-    for name in names:
-        colour = page.evaluate(script, name)
+    green, colours = [], {name: page.evaluate(script, name) for name in names}
+    page.evaluate(dress, chosen)  # others compare what is painted with it
+    for name, colour in colours.items():
         red_green_blue = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
         hue, _, strength = colorsys.rgb_to_hsv(*red_green_blue)
         if strength > 0.2 and 70 <= 360 * hue <= 170:

@@ -26,7 +26,7 @@ from components.export.command import export
 from components.export.flight_files import daa_text, xyz_text
 from components.formats.daa_file import read_daa
 from components.view.command import view
-from docs.make.reference import recorded_tables
+from docs.make.reference.__main__ import recorded_tables
 from dsa_des.errors import UsageError
 from tests.support.wired import chain
 from tests.view.test_page import SCENE

@@ -77,7 +77,7 @@ def test_a_chain_on_another_aircraft_changes_nothing_of_the_first():
     tables["wires"] = [w for w in tables["wires"] if "decider_b" not in str(w)]
     unsteered = tables_of(dsa_des.load_scene(tables))[1]
     for name, table in alone.items():
-        mine = unsteered[name]
+        mine = unsteered[name].drop_columns("platform")
         kept = [not str(block).endswith("_b") for block in mine["block"]]
         assert mine.filter(kept).combine_chunks().equals(table), name
     assert not both["truth"].equals(alone["truth"])
@@ -208,3 +208,30 @@ def test_alerting_by_the_truth_says_whose_it_is():
     tables["blocks"]["truth_of_b"] = alone | {"platform": "b"}
     alerts = of_block(tables_of(dsa_des.load_scene(tables))[1]["alerts"], "truth_of_b")
     assert set(alerts["target"].to_pylist()) == {"ownship"}
+
+
+def test_a_recorded_aircraft_that_is_steered_has_its_closest_approach_where_the_truth_says():
+    how = {"decider": {**TURN_AWAY, "pause_s": 1000}, "decides_by": "tracker", "duration_s": 110}
+    tables = scene_of(OWN, [B], {"_b": "INTRUDER"}, **how).resolved()
+    file = {"type": "traffic.daa_file", "file": "configs/encounters/crossing.daa"}
+    tables["blocks"]["traffic"] = file
+    simulation, recorded = tables_of(dsa_des.load_scene(tables))
+    assert len(recorded["manoeuvres"]) == 1
+    found = simulation.components["traffic"].report()["targets"]["INTRUDER"]["closest_approach"]
+    ends = [recorded["truth"].filter(pc.equal(pc.fill_null(recorded["truth"]["target"], ""), name))
+            for name in ("", "INTRUDER")]  # fmt: skip
+    own, other = (np.array([cartesian(row) for row in end.to_pylist()]) for end in ends)
+    nearest = np.linalg.norm(own - other, axis=1).min()
+    assert found["range_m"] == pytest.approx(nearest, abs=3.0) and nearest > 100.0
+
+
+def test_tables_say_on_which_platform_a_block_is_where_there_are_several():
+    tables = tables_of(scene_of(OWN, [B, C], BOTH, duration_s=20))[1]
+    for name in ("scans", "detections", "tracks", "truth"):
+        rows = {(row["block"], row["platform"]) for row in tables[name].to_pylist()}
+        kinds = {block.removesuffix("_b") for block, _ in rows}
+        (kind,) = kinds
+        on = {(kind, "ownship"), (f"{kind}_b", "b")}
+        assert rows == ({("traffic", None)} if kind == "traffic" else on)
+    alone = tables_of(scene_of(OWN, [B], {"_b": "b"}, duration_s=5))[1]
+    assert not any("platform" in table.column_names for table in alone.values())

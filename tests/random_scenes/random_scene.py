@@ -14,6 +14,7 @@ import random_blocks
 import random_flights
 from dice import Dice
 from random_changes import outages, timed
+from random_platforms import equip
 
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
@@ -82,10 +83,11 @@ class Case:
         return replace(self, tables=tables)
 
 
-def legal_case(seed: int, folder: Path, changing: float = 0.2) -> Case:
+def legal_case(seed: int, folder: Path, changing: float = 0.2, equipped: float = 1 / 3) -> Case:
     """Return the scene of a seed: the first of those drawn that is legal, written to a folder.
 
-    In a share of all scenes, `changing`, something changes while they run.
+    In a share of all scenes, `changing`, something changes while they run; in another, `equipped`,
+    others than the ownship carry sensors too.
 
     Raises
     ------
@@ -93,8 +95,19 @@ def legal_case(seed: int, folder: Path, changing: float = 0.2) -> Case:
         If none is.
     """
     refused: list[str] = []
+    aboard = Dice(13 * seed + 3)
+    is_equipped = aboard.chance(equipped)
     for attempt in range(_MOST_ATTEMPTS):
         case = _Maker(Dice(1000 * seed + attempt)).case(seed)
+        try:
+            alone = case.load(folder)
+            if is_equipped:
+                aboard.features.clear()
+                equip(case.tables, alone, aboard)
+                case.features |= aboard.features
+        except SceneError as error:
+            refused += [problem.message for problem in error.problems]
+            continue
         apart = Dice(11 * seed + 5 + attempt)  # scenes in which nothing changes stay what they were
         if apart.chance(changing, "changes") and (changes := timed(case.tables, apart)):
             case.tables["changes"] = changes

@@ -31,14 +31,14 @@ _PATIENCE = 100
 
 
 def one(
-    seed: int, limit_s: float, every: int, changing: float
+    seed: int, limit_s: float, every: int, changing: float, equipped: float
 ) -> tuple[Verdict, set[str], list[str]]:
     """Judge the scene of a seed; return also its features and the refusals before it."""
     with tempfile.TemporaryDirectory(prefix="random-scene-") as name:
         folder = Path(name)
         try:
             with time_limit(10 * limit_s):
-                case = legal_case(seed, folder, changing)
+                case = legal_case(seed, folder, changing, equipped)
         except TooLong:
             return Verdict("hung", "while it is loaded"), set(), []
         except Exception as error:
@@ -64,17 +64,19 @@ def _outside(case: Any, folder: Path, limit_s: float) -> Verdict:
     return Verdict("different", found) if found else Verdict("same")
 
 
-def _worker(connection: Connection, limit_s: float, every: int, changing: float) -> None:
+def _worker(
+    connection: Connection, limit_s: float, every: int, changing: float, equipped: float
+) -> None:
     while True:
         seed = connection.recv()
-        connection.send(one(seed, limit_s, every, changing))
+        connection.send(one(seed, limit_s, every, changing, equipped))
 
 
 class _Worker:
     """A process that judges one scene at a time, and is replaced when it does not come back."""
 
-    def __init__(self, limit_s: float, every: int, changing: float) -> None:
-        self._arguments = limit_s, every, changing
+    def __init__(self, limit_s: float, every: int, changing: float, equipped: float) -> None:
+        self._arguments = limit_s, every, changing, equipped
         self.limit_s = _PATIENCE * limit_s
         self.start()
 
@@ -109,11 +111,11 @@ class _Worker:
 
 
 def judged(
-    seeds: list[int], workers: int, limit_s: float, every: int, changing: float
+    seeds: list[int], workers: int, limit_s: float, every: int, changing: float, equipped: float
 ) -> Iterator[tuple[int, Verdict, set[str], list[str]]]:
     """Yield what came of each seed, as it comes."""
     todo = deque(seeds)
-    crew = [_Worker(limit_s, every, changing) for _ in range(max(1, workers))]
+    crew = [_Worker(limit_s, every, changing, equipped) for _ in range(max(1, workers))]
     try:
         while todo or any(worker.seed is not None for worker in crew):
             for worker in crew:
@@ -147,6 +149,7 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=20.0, help="longest run, processor s [20]")
     parser.add_argument("--every", type=int, default=100, help="scenes from one study to the next")
     parser.add_argument("--changing", type=float, default=0.2, help="share that changes [0.2]")
+    parser.add_argument("--equipped", type=float, default=1 / 3, help="with more platforms [1/3]")
     parser.add_argument("--out", type=Path, default=Path("random-scenes"), help="for faulty scenes")
     options = parser.parse_args()
     kinds: Counter[str] = Counter()
@@ -155,7 +158,7 @@ def main() -> None:
     started = time.monotonic()
     seeds = list(range(options.seed, options.seed + options.count))
     for seed, verdict, has, reasons in judged(
-        seeds, options.workers, options.limit, options.every, options.changing
+        seeds, options.workers, options.limit, options.every, options.changing, options.equipped
     ):
         kinds[verdict.kind] += 1
         features.update(has)
@@ -165,7 +168,7 @@ def main() -> None:
             print(f"{done} of {options.count} done", file=sys.stderr, flush=True)
         if verdict.kind != "same":
             print(f"{seed} {verdict.kind}: {verdict.detail}", flush=True)
-            _keep(seed, options.out, options.changing)
+            _keep(seed, options.out, options.changing, options.equipped)
     print(f"features of {sum(kinds.values())} scenes:")
     for feature, count in sorted(features.items()):
         print(f"  {count:6} {feature}")
@@ -177,12 +180,12 @@ def main() -> None:
     sys.exit(0 if set(kinds) <= {"same"} else 1)
 
 
-def _keep(seed: int, out: Path, changing: float) -> None:
+def _keep(seed: int, out: Path, changing: float, equipped: float) -> None:
     """Write a faulty scene, with what it reads, to a folder of its own."""
     folder = out / str(seed)
     try:
         with time_limit(60):
-            legal_case(seed, folder, changing)
+            legal_case(seed, folder, changing, equipped)
     except (TooLong, Exception) as error:
         print(f"  not written: {error}")
 

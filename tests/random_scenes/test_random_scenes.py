@@ -98,7 +98,7 @@ def test_the_generator_leaves_nothing_out(tmp_path):
         "drop_probability sensor -> fusion", "cue loop", "fusion.covariance_intersection",
         "tracker that estimates", "late looks that count", "fusion.pass_through",
         "changes enabled", "changes scan_rate_hz", "changes delay_s", "changes for a while",
-        "outages",
+        "outages", "2 platforms", "3 platforms", "site",
     }  # fmt: skip
     for seed in range(9_200_000, 9_200_120):
         wanted -= legal_case(seed, tmp_path).features

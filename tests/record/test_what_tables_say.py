@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 from matplotlib.figure import Figure
 
 import dsa_des
-from docs.make.reference import recorded_tables
+from docs.make.reference.__main__ import recorded_tables
 from dsa_des.block.recorded_columns import LEADING
 from dsa_des.record.drawing import _make_plain
 

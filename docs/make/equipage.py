@@ -1,0 +1,65 @@
+"""``python -m docs.make.equipage FOLDER``: the table of risk by who avoids, of docs/platforms.md.
+
+The folder is that of ``dsa-des study equipage``.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import pandas as pd  # type: ignore[import-untyped]
+
+from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.terminal import say
+
+_EVENTS = {"nmac": "NMACs", "well_clear_lost": "losses of well clear"}
+_NOBODY, _ALONE = "none", ["ownship", "intruder"]
+
+
+def rows(folder: Path) -> list[str]:
+    """Return the lines of the table, and what several that turn bring about.
+
+    Events count by their encounters' weights, as shares of those without anybody's manoeuvres.
+    """
+    ratios, runs = (pd.read_parquet(folder / name) for name in ("ratios.parquet", "parts"))
+    lines = ["| who avoids |" + "".join(f" {words} | risk ratio, 95 % | induced |"
+             for words in _EVENTS.values()), "|---" * (1 + 3 * len(_EVENTS)) + "|"]  # fmt: skip
+    for who, mine in ratios.groupby("equipage", sort=False):
+        of = mine.set_index("result").to_dict("index")
+        cells = (_cells(of[f"{event}_risk_ratio"]) for event in _EVENTS)
+        lines.append(f"| {who} | {' | '.join(cells)} |")
+    together: list[str] = []
+    for event, words in _EVENTS.items():
+        happens = runs.pivot(index="replica", columns="equipage", values=f"{event}_mitigated")
+        weight = runs[runs.equipage == _NOBODY].set_index("replica").encounter_weight
+        nominal = float((weight * happens[_NOBODY]).sum())
+        for who in happens.columns.difference([_NOBODY, *_ALONE]):
+            new = (happens[who] > 0.0) & (happens[_ALONE] == 0.0).all(axis=1)
+            together.append(
+                f"{who}: {int(new.sum())} of {int(happens[who].sum())} {words} where neither alone "
+                f"has one, {float((weight * new).sum()) / nominal:.3f} of the nominal risk"
+            )
+    return [*lines, "", *together]
+
+
+def _cells(one: dict[str, Any]) -> str:
+    between = f"{one['ratio']:.3f} ({one['gamma_low']:.3f} to {one['gamma_high']:.3f})"
+    ratio = between if one["induced_events"] or one["ratio"] != 1.0 else "1"
+    return f"{one['mitigated_events']} | {ratio} | {one['induced']:.3f}"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command and return its exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m docs.make.equipage", description="Print the table of risk by who avoids."
+    )
+    parser.add_argument("folder", type=Path, help="of dsa-des study equipage")
+    for line in rows(parser.parse_args(arguments).folder):
+        say(line)
+    return 0
+
+
+if __name__ == "__main__":
+    with plain_ending():
+        sys.exit(main())

@@ -1,0 +1,1 @@
+"""``python -m docs.make.reference``: docs/reference.md, from the code."""
