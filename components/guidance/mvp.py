@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from components.geometry import enu_to_geodetic, line_of_sight_ned
-from components.guidance.potential import Others, KeptApart, conflicts, may_resume, pushed
+from components.guidance.potential import KeptApart, Others, conflicts, may_resume, pushed
 from components.messages.alerts import AlertLevels
 from components.messages.reach import FarthestLook
 from components.messages.steering import Velocities

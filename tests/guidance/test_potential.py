@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.guidance.potential import Others, KeptApart, conflicts, may_resume, pushed
+from components.guidance.potential import KeptApart, Others, conflicts, may_resume, pushed
 
 KEPT = KeptApart(50.0, 1.05, 120.0)
 
