@@ -191,7 +191,8 @@ Which models may be crude without changing the answer?
 
 `dsa-des cost STUDY --answer RESULT` runs a study with each model in place of the scene's own, one at a
 time, on the same seeds, draws and encounters. A model may be taken where the *whole* interval of its change
-lies within the limit; not to have seen a change is no proof of none. All below is said by the command.
+lies within the limit; not to have seen a change is no proof of none. The command says all below, and in words what
+the tables show.
 
 {answers}
 

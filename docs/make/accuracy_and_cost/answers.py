@@ -96,5 +96,25 @@ def _tables(report: AnswerReport) -> list[str]:
         lines.append(f"| {' | '.join(HEADS[k] for k in used)} |")
         lines.append("|---" * len(used) + "|")
         lines += [f"| {' | '.join(row[k] for k in used)} |" for row in rows]
-        lines += ["", *(f"{line}\n" for line in report.sentences(result.name))]
+        lines += ["", *(f"{line}\n" for line in beside_the_table(report.sentences(result.name)))]
     return [*lines, *(f"{line}  " for line in report.about()), ""]
+
+
+#: Sentences that list what the head of the page, or the column of verdicts, shows.
+_SHOWN = (
+    "May be taken",
+    "No model is surely",
+    "The cheapest is",
+    "None of them surely",
+    "Within it:",
+    "Surely changed",
+)
+
+
+def beside_the_table(sentences: Sequence[str]) -> list[str]:
+    """Return what the sentences about a result say that the page does not show elsewhere."""
+    rest = [line for line in sentences if not line.startswith(_SHOWN)]
+    return [
+        f"{line.partition('):')[0]})." if line.startswith("The same in every run") else line
+        for line in rest
+    ]
