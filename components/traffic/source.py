@@ -118,6 +118,22 @@ class TrafficSource(Component):
         """Return the names of all aircraft, the ownship's first."""
         return self.roster.own_name, *self.roster.names
 
+    def seen_from(self, platform: str = "") -> list[Any]:
+        """Return the flights, as known now, of a platform (by default the ownship) and then of all
+        that it may see, each by its `name`.
+        """
+        viewer = self._index(platform)
+        others = {
+            place: flight
+            for place, flight in enumerate(self.targets)
+            if place != viewer and place not in self.unseen
+        }
+        if viewer < 0:
+            return [self.own, *others.values()]
+        own = copy(self.own)
+        own.name = self.roster.own_name
+        return [self.targets[viewer], *(of for _, of in sorted({**others, viewer: own}.items()))]
+
     def offer(self, port: str) -> KnownTraffic:
         """Say what the targets are, and where they can be; to all blocks the same.
 
