@@ -26,6 +26,7 @@ from components.line_of_sight.error_map import (
 )
 from docs.make.accuracy_and_cost.answers import head as answers_head
 from docs.make.accuracy_and_cost.answers import reports, section
+from docs.make.stamp import stamped
 from dsa_des.arrays.types import AnyArray
 from dsa_des.files.output_file import write_file
 from dsa_des.record.recording import Recorder
@@ -325,6 +326,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         encounter_says=options.encounter_says,
         trackers=_tables(third),
     )
+    page = stamped(page, "python -m docs.make.accuracy_and_cost")
     write_file(options.docs / "accuracy-and-cost.md", page.encode())
     return 0
 
