@@ -42,9 +42,12 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
         mine, feeders = carrying[name], _feeding(scene, name, carrying)
         for other in sorted(feeders.keys() - {mine}):
             by = f"{feeders[mine]} feeds it" if mine in feeders else "its key platform says"
+            how = "give each platform one of its own"
+            if mine not in feeders:
+                how += ", and say which at the first block of its chain"
             message = (
                 f"is carried by {mine!r}, as {by}, and {feeders[other]} on {other!r} feeds it too: "
-                "a block looks from one place; give each platform one of its own"
+                f"a block looks from one place; {how}"
             )
             problems.append(scene.problem(f"blocks.{name}", message))
     if problems:
