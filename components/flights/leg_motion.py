@@ -202,7 +202,7 @@ def ramp_state(
     """Evaluate ramps: level flight whose velocity changes steadily at first.
 
     The way is v t + a (T t - T²/2) with T the time gone of the change, along an arc with the radii
-    of where it begins: 10 km on it is 0.03 m off the geodesic.
+    of where it begins: over 10 km it keeps its length to 0.5 m.
     """
     gone = np.minimum(elapsed, table[_LASTS])
     more = gone * elapsed - 0.5 * gone * gone

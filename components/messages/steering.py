@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from dsa_des.arrays.run_ticks import RunTicks
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import PER_ROW, Message, column
 
 #: Slower turns are none: at 340 m/s their radius is beyond the 200 km that flights can have.
@@ -163,3 +163,33 @@ class Velocities(Manoeuvres):
     velocity_north_mps: FloatArray = column(
         "m/s", "", "commanded velocity over the ground, north", of=PER_ROW, default=None
     )
+
+
+@dataclass(eq=False)
+class ChosenSides(Message):
+    """Which side one who steers has chosen, told to others that coordinate with it.
+
+    Parameters
+    ----------
+    address : (rows,) of int
+        Whose choice it is; of two, the lower one goes first.
+    side : (rows,) of int
+        1 to the right or up, -1 to the left or down.
+    """
+
+    row_table = "sides"
+
+    address: IntArray = column("", "", "address of who chose", "int64", of=PER_ROW)
+    side: IntArray = column(
+        "", "", "1: to the right, or up; -1: to the left, or down", "int64", of=PER_ROW
+    )
+
+    @classmethod
+    def at_rows(cls, instants: RunTicks, address: int, sides: Mapping[int, int]) -> Self | None:
+        """Return the sides chosen at some instants, by these' positions; None without any."""
+        rows = sorted(row for row, side in sides.items() if side)
+        if not rows:
+            return None
+        some = instants.take(np.array(rows))
+        chosen = np.array([sides[row] for row in rows], dtype=np.int64)
+        return cls(some.tick, np.full(len(rows), address), chosen).of_runs(some.run)

@@ -161,7 +161,7 @@ def test_the_fleet_keeps_apart_without_errors():
     }
     simulation = Simulation(scene_of(dsa_des.load_scene(fleet), Replica(1, exact)))
     simulation.run()
-    traffic, times = simulation.nodes["traffic"].component, np.arange(0.0, 120.0, 0.5)
+    traffic, times = simulation.nodes["traffic"].component, np.arange(0.0, 200.0, 0.5)
     states = [traffic.own.at(times), *(flight.at(times) for flight in traffic.targets)]
     places = np.array(
         [[(of.lat_deg - 52) * 111_267.0, (of.lon_deg - 4) * 68_677.0] for of in states]
