@@ -305,7 +305,7 @@ def flights_of(
 
 
 def _told_by(table: Any, name: str) -> list[float]:
-    """Return what manoeuvres say; NaN of what no block of the scene commands, such as velocities."""
+    """Return what manoeuvres say; NaN of what no block commands, such as velocities."""
     nothing = np.full(len(table["replica"]), np.nan)
     values: list[float] = table.get(name, nothing).tolist()
     return values
