@@ -127,6 +127,10 @@ class TurnOut(Component):
                     "tell each other their sides one goes first; give each one of its own"
                 )
 
+    def records(self) -> list[type[Message]]:
+        """Return what is recorded: sides only where it tells them."""
+        return [Manoeuvres] if self.p.address is None else [*super().records()]
+
     def offer(self, port: str) -> int | None:
         """Say which address it has."""
         return self.p.address
