@@ -134,3 +134,11 @@ def test_quantiles_are_those_of_the_runs_with_both_values() -> None:
     assert change.own.value == 180.0
     few = change_of(TAIL, {"range_m": [1.0] * 5}, {"range_m": [2.0] * 5})
     assert few.reason == "5 runs are too few for an interval"
+
+
+def test_how_often_there_is_a_value_with_the_other_model_goes_down_where_it_is_lost() -> None:
+    """Three of five runs lose it and one comes to have it: a mean of -0.4 of -1, -1, -1, 1, 0."""
+    own, other = [1.0, 2.0, 3.0, NAN, 5.0], [NAN, NAN, NAN, 4.0, 7.0]
+    change = change_of(RANGE, ranges(own), ranges(other))
+    assert (change.lost, change.gained, change.neither) == (3, 1, 0)
+    assert change.presence is not None and change.presence.value == pytest.approx(-0.4)

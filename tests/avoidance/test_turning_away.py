@@ -7,6 +7,8 @@ import pytest
 from covering import covers
 from wired import chain, rows, run, sensor
 
+from components.avoidance import TurnAwayParameters
+
 TRACKER = {"type": "tracking.stub"}
 
 
@@ -135,3 +137,11 @@ def test_it_is_the_nearest_track_that_is_turned_away_from(nearer):
     ]
     (told,) = rows(run(scene), "manoeuvres")
     assert (told["turn_rad"] > 0) is (nearer == "left")
+
+
+def test_a_rate_is_said_to_be_idle_where_a_bank_is_given():
+    rate, bank = {"rate_deg_s": 2.0}, {"bank_deg": 20.0}
+    assert TurnAwayParameters(**rate).without_effect() == []
+    assert TurnAwayParameters(**bank).without_effect() == []
+    (said,) = TurnAwayParameters(**rate, **bank).without_effect()
+    assert "rate_deg_s" in said and "bank_deg is given" in said

@@ -104,7 +104,6 @@ def test_scans_are_found_as_by_looking_at_all(tmp_path_factory, rows, start_s, l
     block = np.array([name for name, _ in rows])
     columns = {"block": block.tolist(), "time_s": time_s, "detected": hit.astype(np.int64)}
     write(folder, "scans", columns, group)
-    write(folder, "detections", columns | {"time_s": time_s + 0.25})  # another table of the run
     scans = read_scans(folder)
     shown = scans_between(folder, start_s, start_s + length_s, scans)
     assert list(scans) == list(shown) == sorted(set(block.tolist()))
@@ -276,3 +275,13 @@ def test_drawing_tracks_takes_the_same_memory_however_long_the_run(tmp_path, mon
     monkeypatch.setattr(tracks, "_KEPT_ROWS", 6000)
     tracks_drawn(tmp_path, 2)
     assert tracks_drawn(tmp_path, 40) < 1.3 * tracks_drawn(tmp_path, 5)
+
+
+def test_scans_are_read_from_their_own_table(tmp_path):
+    time_s = np.arange(6.0)
+    columns = {"block": ["a", "b"] * 3, "time_s": time_s, "detected": [0, 1, 1, 0, 1, 1]}
+    write(tmp_path, "scans", columns)
+    write(tmp_path, "detections", columns | {"time_s": time_s + 0.25})
+    shown = scans_between(tmp_path, 2.0, 4.0, ["a", "b"])
+    assert [shown[name].time_s.tolist() for name in "ab"] == [[2.0, 4.0], [3.0]]
+    assert [shown[name].hit_s.tolist() for name in "ab"] == [[2.0, 4.0], [1.0]]

@@ -1,5 +1,7 @@
 """Interpolation between samples: exact at them, seamless, never outside."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from geographiclib.geodesic import Geodesic
@@ -10,6 +12,7 @@ from components.flights.legs import Turn
 from components.flights.sampled_flight import SampledTrajectory
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
+from components.traffic.recorded import suspicions
 
 
 def distance(a, b):
@@ -177,3 +180,24 @@ def test_bad_samples_are_named(change, message):
     good = {"time_s": [0, 1, 2], "lat_deg": [0, 0, 0], "lon_deg": [0, 0, 0], "alt_m": [0, 0, 0]}
     with pytest.raises(ValueError, match=message):
         SampledTrajectory("x", **(good | change))
+
+
+@pytest.mark.parametrize(
+    ("east_deg", "up_m", "said"),
+    [
+        (0.0005, 0.0, None),
+        (0.02, 0.0, "b: its positions imply 1,374 m/s; "),
+        (0.0005, 300.0, "b: it climbs or sinks at 300 m/s; "),
+        (0.0005, 199.0, None),
+        (0.0005, 1201.0, "b: its positions imply 1,201 m/s; "),
+    ],
+)
+def test_flights_that_no_aircraft_flies_are_said_with_their_speed(east_deg, up_m, said):
+    """A thousandth of a degree of the parallel of 52.01 degrees is 68.7 m at that height."""
+    seconds = np.arange(5.0)
+    craft = SimpleNamespace(
+        name="b", lat_deg=np.full(5, 52.01), lon_deg=4.0 + east_deg * seconds,
+        alt_m=1200.0 + up_m * seconds, sample_times_s=seconds, velocity_was_ignored=False,
+    )  # fmt: skip
+    found = suspicions([craft])
+    assert len(found) == (said is not None) and (said is None or found[0].startswith(said))

@@ -1,14 +1,19 @@
 """Scripted flights: geodesics, circles, waypoints, and what happens at the end."""
 
+import math
+
 import numpy as np
+import pymap3d
 import pytest
 from geographiclib.geodesic import Geodesic
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from components.flights.attitude import Wind
 from components.flights.legs import Climb, Stationary, Straight, Turn, Waypoint, Waypoints
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
+from components.traffic.scripted import Intruder, _intruders
 
 WGS84 = Geodesic.WGS84
 START = {"lat_deg": 45.0, "lon_deg": -75.0, "alt_m": 1000.0}
@@ -275,3 +280,19 @@ def test_given_attitude_overrides():
 def test_bad_scripts_are_named(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_an_intruder_s_waypoints_count_from_the_ownship_s_start():
+    """From 2 km east of it to 5 km north of it, at 60 m/s over the ground, whatever the wind."""
+    reference = (-41.3, -179.9997, 2400.0)
+    legs = [{"kind": "waypoints", "points": [{"east_m": 0.0, "north_m": 5000.0, "up_m": 0.0}]}]
+    craft = Intruder(
+        name="to", east_m=2000.0, north_m=0.0, up_m=0.0, heading_deg=90.0, speed_mps=60.0, legs=legs
+    )
+    fleet = _intruders([craft], reference, Wind.from_direction(10.0, 270.0))
+    state = fleet.each(np.array([0]), np.array([30.0]))
+    east, north, _ = pymap3d.geodetic2enu(
+        state.lat_deg[0], state.lon_deg[0], state.alt_m[0], *reference
+    )
+    part = 1800.0 / math.hypot(2000.0, 5000.0)
+    assert (east, north) == pytest.approx((2000.0 * (1.0 - part), 5000.0 * part), abs=3.0)

@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import pytest
 
+from components.formats.recording import ReadingNotes
 from components.formats.text_rows import ANGLE_DEG, LENGTH_M, SPEED_MPS, TIME_S
 
 FOOT, MILE, HOUR = Fraction("0.3048"), Fraction(1852), Fraction(3600)
@@ -38,3 +39,17 @@ TIMES = {
 )
 def test_units_are_what_they_are_defined_as(known, expected):
     assert known == pytest.approx({name: float(value) for name, value in expected.items()})
+
+
+def test_what_is_said_of_single_aircraft_is_said_once():
+    notes, other = ReadingNotes(), ReadingNotes()
+    for name in ("a", "b", "c"):
+        notes.of_one(name, "gap", "a gap of 9 s")
+    notes.of_one("c", "gap", "a gap of 9 s")
+    notes.of_one("d", "turn", "turns", harmless=True)
+    other.of_one("e", "gap", "a gap of 2 s")
+    notes.settle()
+    notes.add(other, "own.csv")
+    notes.settle()
+    assert notes.warnings == ["a: a gap of 9 s (and 2 more aircraft)", "own.csv: e: a gap of 2 s"]
+    assert notes.harmless == ["d: turns"]

@@ -1,9 +1,11 @@
 """The radar's effects: what calls for them, and what they do to a run."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 
+from components.radar.timing import TimeBudget
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -200,3 +202,15 @@ def test_targets_that_are_not_offered(scene, monkeypatch):
     monkeypatch.setattr(TrafficSource, "offer", lambda self, port: others)
     with pytest.raises(BlockFailure, match="not offered"):
         simulate(path)
+
+
+@pytest.mark.parametrize(("pulses", "more"), [(None, ""), (7, ", pulses in it: 7")])
+def test_how_beams_share_a_scan_is_said(pulses, more):
+    look = SimpleNamespace(
+        beams=SimpleNamespace(azimuth=30, elevation=2), dwell_s=0.0125, pulses=pulses
+    )
+    said = TimeBudget().verdict(SimpleNamespace(p=SimpleNamespace(look_energy=look)))
+    assert said.simulated
+    assert said.because == f"budget is 'dwell': 30 x 2 beams of 12.5 ms each{more}"
+    free = SimpleNamespace(p=SimpleNamespace(look_energy=None, budget="free"))
+    assert TimeBudget().verdict(free).because == "budget is 'free'"

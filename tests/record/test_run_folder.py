@@ -7,9 +7,11 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from matplotlib.figure import Figure
 
 import dsa_des
 from dsa_des.files.output_folder import RUN_JSON, OutputFolder, foreign_in
+from dsa_des.record.drawing import _make_plain
 from dsa_des.record.run_folder import _rows_of, read_run, write_json, write_run_json
 
 
@@ -122,3 +124,17 @@ def test_rows_of_another_table_are_found_by_block_tick_and_replica(is_dictionary
     wanted = [theirs.index(key) if key in theirs else -1 for key in mine]
     assert _rows_of(table(mine), table(theirs)).tolist() == wanted
     assert _rows_of(table(mine), table(theirs).slice(0, 0)).tolist() == [-1] * len(mine)
+
+
+def test_long_and_hostile_words_are_cut_wherever_they_stand_in_a_figure():
+    figure = Figure()
+    axes = figure.add_subplot()
+    axes.set_title("\x1b[2J" + "long " * 90 + "$x^2$")
+    axes.set_xlabel("two\nlines")
+    axes.set_ylabel("plain")
+    axes.text(0.5, 0.5, "\n".join("many"))
+    _make_plain(figure)
+    shown = axes.get_title()
+    assert len(shown) <= 200 + len(r"\x1b") and "\x1b" not in shown and "$x" not in shown[:100]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("two\nlines", "plain")
+    assert not axes.title.get_parse_math()
