@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -161,7 +161,10 @@ def cells_of_radar(block: Any) -> ResolutionCells:
             f"range_km is {p.range_km:g}: it must be above the minimum range, "
             f"{block.budget.nearest_m / 1000:g} km"
         )
-    return ResolutionCells.filling(block.reach, block.budget.nearest_m, cell_size(p))
+    # Where ranges fold there are no cells beyond.
+    far_m = min(block.reach.range_max_m, p.farthest_report_m)
+    reach = replace(block.reach, range_max_m=far_m)
+    return ResolutionCells.filling(reach, block.budget.nearest_m, cell_size(p))
 
 
 class Merging:
@@ -179,7 +182,9 @@ class Merging:
         seen = block.axes(cells.body_azimuth_rad, cells.body_elevation_rad)
         cell = [
             np.rint(values / width)
-            for values, width in zip((*seen, cells.range_m), self._widths, strict=True)
+            for values, width in zip(
+                (*seen, block.seeming_range_m(cells.range_m)), self._widths, strict=True
+            )
         ]
         # Astern the last cell is the first one.
         astern = np.rint(np.pi / self._widths[0])

@@ -37,6 +37,7 @@ from components.radar.parameters import (
     dwell_factor,
     moved_threshold,
 )
+from components.radar.pulse_trains.folding import Eclipsing, RangeFolding, folded_clutter
 from components.radar.radar import Radar
 from components.radar.rain import RainClutter, SidelobeClutter
 from components.radar.rcs import MEAN_RCS, AspectRcs, constant_rcs_m2, mean_rcs_m2
@@ -77,6 +78,8 @@ class LinkBudgetRadar(Radar):
         AspectRcs(),
         *WEATHER_EFFECTS,
         BlindRange(),
+        Eclipsing(),
+        RangeFolding(),
         BeamShape(),
         GroundClutter(),
         RainClutter(),
@@ -262,7 +265,7 @@ class LinkBudgetRadar(Radar):
     def left_out(self) -> list[str]:
         """Say what the air would take that the scene leaves out, and where echoes are ambiguous."""
         said = [*super().left_out(), *gas_left_out(self)]
-        if self.p.prf_hz is not None and self.p.range_km is None:
+        if self.p.prf_hz is not None and self.p.range_km is None and not self.p.range_folds:
             range_km = self.stated_reach.range_max_m / 1000.0
             said.append(
                 f"targets beyond {range_km:.4g} km: not looked at, their echoes come after the "
@@ -284,6 +287,7 @@ class LinkBudgetRadar(Radar):
             *beam_against_gain(self.p),
             *rain_warnings(self),
             *gas_left_out(self),
+            *folded_clutter(self),
         ]
 
     def report(self) -> dict[str, Any]:
