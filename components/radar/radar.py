@@ -34,9 +34,8 @@ from components.radar.ground_clutter import (
 from components.radar.link_budget import wavelength
 from components.radar.measurement import OwnVelocity
 from components.radar.parameters import RadarParameters
-from components.radar.pulse_trains.folding import SEEMING_RANGE
 from components.radar.rain import RainClutter, SidelobeClutter
-from components.radar.resolution import ONE_REPORT, Merging, OneReportByCell
+from components.radar.resolution import ONE_REPORT, SEEMING_RANGE, Merging, OneReportByCell
 from components.radar.timing import check_unambiguous
 from components.radar.weather import (
     SNR,

@@ -37,13 +37,18 @@ from components.radar.parameters import (
     dwell_factor,
     moved_threshold,
 )
-from components.radar.pulse_trains.folding import Eclipsing, RangeFolding, folded_clutter
 from components.radar.radar import Radar
 from components.radar.rain import RainClutter, SidelobeClutter
 from components.radar.rcs import MEAN_RCS, AspectRcs, constant_rcs_m2, mean_rcs_m2
-from components.radar.resolution import OneReportByCell
+from components.radar.resolution import OneReportByCell, RangeFolding, folded_clutter
 from components.radar.timing import LOOK_ENERGY, TimeBudget, time_report
-from components.radar.weather import WEATHER_EFFECTS, BlindRange, gas_left_out, rain_warnings
+from components.radar.weather import (
+    WEATHER_EFFECTS,
+    BlindRange,
+    Eclipsing,
+    gas_left_out,
+    rain_warnings,
+)
 from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
 from components.sensor.look import Cells, CellValues, Look, values_of
 from components.sensor.sensor import CUED_INPUTS

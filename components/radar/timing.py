@@ -8,10 +8,10 @@ from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from components.radar.link_budget import SPEED_OF_LIGHT_M_S
+from components.arguments.units import SPEED_OF_LIGHT_M_S
 from components.radar.pulse_trains.ambiguity import unambiguous_range_m
-from components.radar.pulse_trains.folding import PulseTrainParameters
-from components.radar.resolution import steps_across
+from components.radar.pulse_trains.keys import PulseTrainParameters
+from components.radar.resolution import ResolutionParameters, steps_across
 from dsa_des.block.effect import Effect, Hook, Verdict
 
 # A dwell that is a whole number of pulses up to rounding has that many.
@@ -73,7 +73,7 @@ class LookEnergy:
     summed: int
 
 
-class TimeBudgetParameters(PulseTrainParameters):
+class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
     """Parameters of what a radar's scan costs in time."""
 
     budget: Literal["free", "dwell"] | None = Field(

@@ -26,7 +26,7 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.radar.link_budget import SPEED_OF_LIGHT_M_S
+from components.arguments.units import SPEED_OF_LIGHT_M_S
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 # Ranges that agree but for rounding do agree.

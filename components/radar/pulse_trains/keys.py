@@ -1,26 +1,22 @@
-"""A scene's pulses: their keys, and eclipsing and range folding as effects."""
+"""The keys of a radar's pulses."""
 
 from dataclasses import replace
-from typing import Any, Protocol, Self
+from typing import Self
 
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
 from components.messages.reach import Reach
 from components.radar.pulse_trains.ambiguity import (
-    coincident_range_m,
     decisive_share,
     received_share,
     unambiguous_range_m,
 )
-from components.radar.resolution import ResolutionParameters, cell_size
-from components.radar.weather import SNR
-from components.sensor.look import Cells, CellValues
+from components.sensor.parameters import SensorParameters
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.effect import Effect, Hook, Verdict
 
 
-class PulseTrainParameters(ResolutionParameters):
+class PulseTrainParameters(SensorParameters):
     """Parameters of a radar's pulses."""
 
     prf_hz: float | None = Field(
@@ -85,7 +81,7 @@ class PulseTrainParameters(ResolutionParameters):
                 f"prfs_needed is {self.prfs_needed}: there are {len(self.prfs_hz)} PRFs, it must "
                 "be at most that"
             )
-        if not cell_size(self)[2]:
+        if not (getattr(self, "range_cell_m", None) or getattr(self, "range_resolution_m", 0)):
             raise ValueError(
                 "range_resolution_m is 0 and other_prfs_hz is given: ranges of several PRFs agree "
                 "within half a cell, it must be above 0"
@@ -128,95 +124,3 @@ class PulseTrainParameters(ResolutionParameters):
     def decisive_share(self, shares: FloatArray) -> FloatArray:
         """Return the share that decides whether enough PRFs see each target."""
         return decisive_share(shares, self.prfs_needed or len(self.prfs_hz))
-
-
-class Eclipsing(Effect[CellValues]):
-    """No echo is received while a pulse is sent: the SNR is that of the share that is.
-
-    Of several PRFs the one counts by which just enough see the target.
-    """
-
-    name = "eclipsing"
-    acts_on = SNR
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``pulse_width_s``."""
-        width_s = block.p.pulse_width_s
-        if width_s is None:
-            return Verdict(False, "pulse_width_s is not given")
-        return Verdict(True, f"pulse_width_s is {width_s:g}")
-
-    def build(self, block: Any) -> CellValues:
-        """Return the factor on every cell's SNR."""
-        p = block.p
-        if p.pulse_width_s is None:
-            return lambda cells: np.ones(len(cells))
-
-        def factor(cells: Cells) -> FloatArray:
-            decisive: FloatArray = p.decisive_share(p.shares(np.asarray(cells.range_m)))
-            return decisive
-
-        return factor
-
-
-class SeemingRange(Protocol):
-    """Gives the ranges that echoes seem to come from."""
-
-    def __call__(self, range_m: FloatArray, /) -> FloatArray:
-        """Return them for true ones, m."""
-
-
-SEEMING_RANGE = Hook("seeming range", SeemingRange, "range that an echo seems to come from, m")
-
-
-class RangeFolding(Effect[SeemingRange]):
-    """Echoes of earlier pulses are taken for those of the last one.
-
-    Of several PRFs those see a target that receive as much of it as the one that decides; the range
-    is where they agree. Echoes of ground and rain fold too: these are left out, and so are ghosts
-    between the echoes of two targets.
-    """
-
-    name = "range folding"
-    acts_on = SEEMING_RANGE
-    outside_the_proof = "without it nothing is seen beyond c / 2PRF"
-
-    def verdict(self, block: Any) -> Verdict:
-        """Ask for ``range_folds``, and say which PRFs resolve it."""
-        p = block.p
-        if not p.range_folds:
-            return Verdict(False, "range_folds is false")
-        if not p.other_prfs_hz:
-            return Verdict(True, f"range_folds is true: at {p.farthest_report_m / 1000:.4g} km")
-        count = len(p.prfs_hz)
-        return Verdict(True, f"range_folds is true: {p.prfs_needed or count} of {count} PRFs")
-
-    def build(self, block: Any) -> SeemingRange:
-        """Return what gives the seeming ranges of true ones."""
-        p = block.p
-        if not p.range_folds:
-            return lambda range_m: range_m
-
-        def seeming(range_m: FloatArray) -> FloatArray:
-            shares = p.shares(range_m)
-            return coincident_range_m(
-                range_m,
-                prfs_hz=p.prfs_hz,
-                seen=shares >= p.decisive_share(shares),
-                tolerance_m=0.5 * cell_size(p)[2],
-            )
-
-        return seeming
-
-
-def folded_clutter(block: Any) -> list[str]:
-    """Say that echoes of ground and rain do not fold, where there are some and a target's do."""
-    terrain, weather = (block.context.sections.get(name) for name in ("terrain", "weather"))
-    ground = terrain is not None and terrain.height_m is not None
-    rain = weather is not None and weather.rain_rate_mm_h > 0
-    if not (block.p.range_folds and (ground or rain)):
-        return []
-    return [
-        "range_folds: echoes of ground and rain do not fold, clutter is that of a target's true "
-        "range: over ground nearer than that this radar sees too much"
-    ]
