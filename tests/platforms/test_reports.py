@@ -6,6 +6,9 @@ import pytest
 from equipped import AVOIDANCE, scene_of
 
 import dsa_des
+from components.display.flights import Flights
+from components.display.map_view import outline_of
+from dsa_des.running.simulation import Simulation
 
 OWN = {"lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 1000, "heading_deg": 0, "speed_mps": 50}
 B = {"name": "b", "east_m": 6200, "north_m": 6000, "up_m": 0, "heading_deg": 270, "speed_mps": 50}
@@ -63,3 +66,20 @@ def test_the_terminal_has_a_block_for_each(run, capsys):
     for text, name, other in ((own, "tracker", "b"), (theirs, "tracker_b", "ownship")):
         assert f"{name}: " in text and f" {other} " in text
     assert "_b" not in own and "tracker:" not in theirs
+
+
+def test_a_field_of_view_is_drawn_where_its_platform_starts():
+    """One that looks 10° to both sides along its course to the west, 8 km, from 6.2 km east."""
+    simulation = Simulation(dsa_des.load_scene("one_is_blind"))
+    simulation.run()
+    flights = Flights.of(simulation, {})
+    yaw_rad, start_km = flights.start_of("other")
+    assert np.degrees(yaw_rad) % 360.0 == pytest.approx(270.0, abs=0.1)
+    assert start_km == pytest.approx((6.2, 6.0), abs=0.01)
+    assert flights.start_of("ownship") == (pytest.approx(0.0), (0.0, 0.0))
+    radar = simulation.components["radar_b"]
+    corners = outline_of(yaw_rad, radar.stated_reach, radar.axes, start_km).corners_km
+    angle = np.radians([260.0, 280.0])
+    tips = [(6.2 + 8.0 * np.sin(one), 6.0 + 8.0 * np.cos(one)) for one in angle]
+    assert corners[[0, -2]] == pytest.approx(np.array(tips), abs=0.02)
+    assert corners[-1] == pytest.approx(start_km)
