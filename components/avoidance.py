@@ -11,10 +11,16 @@ from components.arguments.units import FOOT_M, STANDARD_GRAVITY_M_S2
 from components.guidance.daidalus import ConfParameters, changes_out, smaller, why_never_steers
 from components.messages.alerts import AlertLevels
 from components.messages.detections import without_range
-from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
+from components.messages.steering import (
+    SLOWEST_TURN_DEG_S,
+    ChosenSides,
+    Manoeuvre,
+    Manoeuvres,
+)
 from components.messages.tracks import Tracks
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
+from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
 from dsa_des.record.undone import NO_COUNTS, with_cases
 
@@ -46,13 +52,23 @@ class TurnOutParameters(ConfParameters):
     pause_s: NonNegativeRational = Field(
         default=Fraction(10), description="Shortest time from one manoeuvre to the next, s."
     )
+    address: int | None = Field(
+        default=None, ge=0, description="With an address it tells which side it has chosen, at "
+        "every instant with an alert, and heeds what others tell: who chooses takes the side that "
+        "goes with theirs, and of two that chose what does not, the higher address changes.",
+    )  # fmt: skip
+    heeds_s: NonNegativeRational = Field(
+        default=Fraction(10), description="What another one has told counts for so long, s."
+    )
 
     def without_effect(self) -> list[str]:
         """Say which keys belong to manoeuvres that are not chosen."""
         used = {"turn": "beyond_deg", "climb": "beyond_m"}.get(self.manoeuvre, "beyond_mps")
         keys = {"beyond_deg", "beyond_m", "beyond_mps"} - {used}
         because = f"manoeuvre is '{self.manoeuvre}'"
-        return super().without_effect() + self.idle(*sorted(keys), because=because)
+        said = super().without_effect() + self.idle(*sorted(keys), because=because)
+        alone = self.idle("heeds_s", because="address is not given")
+        return said if self.address is not None else said + alone
 
 
 class TurnOut(Component):
@@ -63,10 +79,19 @@ class TurnOut(Component):
     value is clear it goes towards the recovery band; without one it leaves the ownship alone.
     """
 
-    inputs = {"alerts": Input(AlertLevels, "trigger", "The alert level of each target.")}
-    outputs = {"manoeuvres": Output(Manoeuvres, "What the ownship is told to fly.")}
+    inputs = {
+        "alerts": Input(AlertLevels, "trigger", "The alert level of each target."),
+        "told": Input(
+            ChosenSides, "queued", "Which sides others have chosen.", required=False, many=True,
+            between_platforms=True,
+        ),
+    }  # fmt: skip
+    outputs = {
+        "manoeuvres": Output(Manoeuvres, "What the ownship is told to fly."),
+        "sides": Output(ChosenSides, "Which side it has chosen, where it has an address."),
+    }
     Parameters = TurnOutParameters
-    remembers = ("_free_from", "_stuck")
+    remembers = ("_free_from", "_stuck", "_heard", "_chosen")
     windowed = True
     lockstep = True
     rewindable = True
@@ -90,6 +115,21 @@ class TurnOut(Component):
         self._free_from: dict[int, int] = {}
         #: How often nothing led out, of how often something had to.
         self._stuck = NO_COUNTS
+        #: By run: what others have told (when, address, side), and which side it chose, and when.
+        self._heard: dict[int, tuple[tuple[int, int, int], ...]] = {}
+        self._chosen: dict[int, tuple[int, int]] = {}
+        if self.p.address is None:
+            return
+        for producer in self.context.producers:
+            if producer.port == "told" and producer.offer == self.p.address:
+                raise ValueError(
+                    f"address is {self.p.address}, and {producer.block} has the same: of two that "
+                    "tell each other their sides one goes first; give each one of its own"
+                )
+
+    def offer(self, port: str) -> int | None:
+        """Say which address it has."""
+        return self.p.address
 
     def undone(self) -> dict[str, IntArray]:
         """Return how often it was to steer, and no change led clear."""
@@ -101,37 +141,102 @@ class TurnOut(Component):
             self.p.level, self._configuration, self._alerter, self.context.producers
         )
 
-    def run(self, wake: Wake) -> Manoeuvres | None:
+    def run(self, wake: Wake) -> dict[str, Message]:
         """Look at every instant with an alert."""
         alerts: AlertLevels | None = wake["alerts"]
+        self._hear(wake)
         if alerts is None:
-            return None
+            return {}
         manoeuvres: dict[int, Manoeuvre] = {}
         alerted = np.flatnonzero(alerts.highest() >= self.p.level)
         left = zip(alerted.tolist(), wake.run[alerted].tolist(), strict=True)
         waiting = list(left)
+        told: dict[int, int] = {}
         kind = _KINDS[self.p.manoeuvre]
         while waiting:
             # The first row of every run at which it is free, and then on to the next ones.
             now: dict[int, int] = {}
             later = []
             for index, run in waiting:
+                tick = int(wake.ticks[index])
                 if run in now:
                     later.append((index, run))
-                elif wake.ticks[index] >= self._free_from.get(run, 0):
+                elif tick >= self._free_from.get(run, 0) or self._gives_way(run, tick):
                     now[run] = index
+                elif self.p.address is not None:
+                    told[index] = self._repeated(run, tick)
             rows = list(now.values())
             result = changes_out(kind, self._configuration, self._alerter, alerts, rows)
             for (run, index), changes in zip(now.items(), result, strict=True):
-                change = None if changes is None else smaller(changes)
+                tick = int(wake.ticks[index])
+                change = None if changes is None else self._choose(run, tick, changes)
                 if changes is not None:
                     due = np.array([run])
                     self._stuck = with_cases(self._stuck, due[: change is None], due)
                 if change is not None:
                     manoeuvres[index] = self._manoeuvre(change)
-                    self._free_from[run] = int(wake.ticks[index]) + self._pause_ticks
+                    self._free_from[run] = tick + self._pause_ticks
+                    self._chosen[run] = tick, 1 if change > 0.0 else -1
+                if self.p.address is not None:
+                    told[index] = self._repeated(run, tick)
             waiting = later
-        return Manoeuvres.at_rows(wake.instants, manoeuvres)
+        messages = {
+            "manoeuvres": Manoeuvres.at_rows(wake.instants, manoeuvres),
+            "sides": ChosenSides.at_rows(wake.instants, self.p.address or 0, told),
+        }
+        return {port: message for port, message in messages.items() if message is not None}
+
+    def _hear(self, wake: Wake) -> None:
+        """Take in what others have told, each the last thing of its own."""
+        since = int(wake.ticks[0]) - int(self.p.heeds_s * self.context.ticks_per_s)
+        for new in wake.arrivals("told") if self.p.address is not None else ():
+            sides = new.message
+            columns = sides.run, new.tick, sides.address, sides.side
+            for run, *one in zip(*(of.tolist() for of in columns), strict=True):
+                known = [old for old in self._heard.get(run, ()) if old[0] > since]
+                self._heard[run] = (*known, (one[0], one[1], one[2]))
+
+    def _others(self, run: int, tick: int) -> list[tuple[int, int]]:
+        """Return address and side of all that have told theirs and count at an instant.
+
+        The lowest address first; windows may know more than has come by then.
+        """
+        since = tick - int(self.p.heeds_s * self.context.ticks_per_s)
+        last = {a: side for at, a, side in self._heard.get(run, ()) if since < at <= tick}
+        return sorted(last.items())
+
+    def _with(self, side: int) -> int:
+        """Return the side that goes with another one's: both to the right, one up and one down."""
+        return side if self.p.manoeuvre == "turn" else -side
+
+    def _repeated(self, run: int, tick: int) -> int:
+        """Return the side that was chosen in this conflict, which an alert prolongs; 0: none."""
+        at, side = self._chosen.get(run, (-1, 0))
+        if not side or tick - at > int(self.p.heeds_s * self.context.ticks_per_s):
+            return 0
+        self._chosen[run] = tick, side
+        return side
+
+    def _gives_way(self, run: int, tick: int) -> bool:
+        """Whether a lower address has chosen what does not go with its own choice."""
+        mine = self._repeated(run, tick) if self.p.address is not None else 0
+        first = [side for a, side in self._others(run, tick) if a < (self.p.address or 0)]
+        return bool(mine and first and self._with(first[0]) != mine)
+
+    def _choose(self, run: int, tick: int, changes: tuple[float, float]) -> float | None:
+        """Return the change to fly: the smaller one, or that which goes with what others told.
+
+        Without a way there it is free.
+        """
+        others = self._others(run, tick) if self.p.address is not None else []
+        mine = self._repeated(run, tick)
+        if mine and self.p.address is not None:  # only a lower address changes what was chosen
+            others = [(a, side) for a, side in others if a < self.p.address]
+        if others:
+            there = changes[1] if self._with(others[0][1]) > 0 else changes[0]
+            if math.isfinite(there):
+                return there
+        return smaller(changes)
 
     def _manoeuvre(self, change: float) -> Manoeuvre:
         """Return what makes a change."""

@@ -1,5 +1,6 @@
 """What costs little or ought to: two forms of a scene in turn."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from statistics import median
@@ -9,7 +10,8 @@ from components.benchmark.scenes import CLOCKED, chosen, engine_run, scene_of
 from components.examples import folder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.scene import Scene, load_scene
+from dsa_des.scene.scene import Scene, changed_tables, load_scene
+from dsa_des.scene.scene_file import read_scene_tables
 
 #: A processor that the three sensors of a scene share, and that is busy a third of the time.
 _SHARED = (
@@ -63,6 +65,20 @@ def _alerting(case: str, quick: bool) -> tuple[Scene, Scene]:
     return load_scene(with_it, duration_s=duration_s), load_scene(plain, duration_s=duration_s)
 
 
+def _equipped(case: str, quick: bool) -> tuple[Scene, Scene]:
+    plain = load_scene(folder() / f"{case}.toml", duration_s="40" if quick else None)
+    tables = plain.resolved()
+    copies = {name: f"{name}_b" for name in tables["blocks"] if name != "traffic"}
+    wires = [f"{wire} " for wire in tables["wires"]]  # "from.port -> to.port"
+    for name, copy in copies.items():
+        tables["blocks"][copy] = dict(tables["blocks"][name])
+        wires = [re.sub(rf"\b{name}([. ])", rf"{copy}\1", wire) for wire in wires]
+    tables["blocks"]["transform_b"]["platform"] = "head_on"
+    return changed_tables(
+        read_scene_tables({**tables, "wires": [*tables["wires"], *map(str.strip, wires)]}, case), ()
+    ), plain
+
+
 PAIRS = (
     Pair("unused_effects",
          "effects that the scene does not call for: declared, or not there at all",
@@ -71,6 +87,8 @@ PAIRS = (
          5.0, "clocks", _processor),
     Pair("alerting", "first light with alert levels of its tracks at 1 Hz, or without",
          2.0, "first_light", _alerting),
+    Pair("both_equipped", "first light with all of it on the head-on aircraft too, or without",
+         2.1, "first_light", _equipped),
 )  # fmt: skip
 
 

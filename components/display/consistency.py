@@ -49,7 +49,7 @@ def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
     for track in drawn.tracks:
         count = len(track.columns["state_s"])
         one = {k: v[:: max(1, count // _MOST_ERRORS)] for k, v in track.columns.items()}
-        result, known = errors_squared(one, drawn.targets.states(one["state_s"]))
+        result, known = errors_squared(one, drawn.seen_by[track.block].states(one["state_s"]))
         if known.any():
             shown.append((track, one["state_s"], result))
     if not shown:

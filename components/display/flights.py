@@ -95,6 +95,8 @@ class Flights:
     def at(self, name: str, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return east and north of a target in km at some times; NaN where it is not known."""
         target = self._targets.get(name)
+        if target is None and name == self._source.roster.own_name:
+            return self.own_at(time_s)
         if target is None:
             nothing = np.full(len(time_s), np.nan)
             return nothing, nothing
@@ -103,6 +105,23 @@ class Flights:
     def own_at(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return east and north of the ownship in km at some times."""
         return self._map(self._source.own.at(time_s))
+
+    def start_of(self, name: str) -> tuple[float, tuple[float, float]]:
+        """Return where an aircraft's nose points at its start, and where that is, km; the ownship's
+        of a name that is no target's.
+        """
+        flight = self._targets.get(name)
+        if flight is None:
+            return self.start_yaw_rad, (0.0, 0.0)
+        state = flight.at(_times(flight, self.duration_s, 2)[:1])
+        east, north = self._map(state)
+        return float(state.yaw_rad[0]), (float(east[0]), float(north[0]))
+
+    @property
+    def tracks(self) -> dict[str, Track]:
+        """The tracks of all whom detections may be of, by name."""
+        own = {self._source.roster.own_name: self.own}
+        return {**own, **{track.name: track for track in self.targets}}
 
     def closest_s(self, name: str) -> float | None:
         """Return when a target is closest, if it ever meets the ownship."""
@@ -154,7 +173,7 @@ Positions = dict[str, list[tuple[Track, FloatArray, FloatArray, FloatArray]]]
 
 def positions(flights: Flights, detected: Detected) -> Positions:
     """Return for each sensor and target the true positions of its detections."""
-    tracks = {track.name: track for track in flights.targets}
+    tracks = flights.tracks
     wanted: dict[int, list[tuple[str, FloatArray]]] = {}
     grouped = {name: by_target(detected.target[name]) for name in detected.sensors}
     most = max(10, MOST_MARKS // max(1, sum(len(groups) for groups in grouped.values())))

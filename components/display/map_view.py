@@ -21,16 +21,19 @@ MAP_WIDTH_IN, _MAP_HEIGHTS_IN = 6.4, (3.8, 6.6)
 class Outline:
     """A field of view from above, with a range limit if closed: its corners (n, 2), east and north.
 
-    One without a limit has the directions of its two edges.
+    One without a limit has the directions of its two edges from where it begins, `start_km`.
     """
 
     corners_km: FloatArray
     radius_km: float
     closed: bool
+    start_km: FloatArray
 
 
-def outline_of(yaw_rad: float, reach: Any, axes: Any) -> Outline:
-    """Return a reach from above, for a level ownship at the origin with its nose at `yaw_rad`.
+def outline_of(
+    yaw_rad: float, reach: Any, axes: Any, start_km: tuple[float, float] = (0.0, 0.0)
+) -> Outline:
+    """Return a reach from above, of who is level at `start_km`, east and north, nose at `yaw_rad`.
 
     It is drawn as the plane of elevation 0 of the sensor's axes; a tilted sensor foreshortens it.
     """
@@ -47,7 +50,8 @@ def outline_of(yaw_rad: float, reach: Any, axes: Any) -> Outline:
     corners = np.column_stack((np.sin(bearing), np.cos(bearing))) * level_km[:, np.newaxis]
     if closed and not everywhere:
         corners = np.vstack((corners, [[0.0, 0.0]]))
-    return Outline(corners, radius_km, closed)
+    corners = corners + start_km if closed else corners
+    return Outline(corners, radius_km, closed, np.array(start_km))
 
 
 def draw_outline(
@@ -69,7 +73,8 @@ def draw_outline(
     for edge in corners * far_km:
         # Shifted dashes keep two fields of view with the same edges apart.
         axes.plot(
-            [0.0, edge[0]], [0.0, edge[1]], color=colour, linewidth=1.2,
+            *np.stack([outline.start_km, outline.start_km + edge], axis=1),
+            color=colour, linewidth=1.2,
             linestyle=(shift, (6, 5)), zorder=0.7, scalex=False, scaley=False,
         )  # fmt: skip
 

@@ -1,20 +1,24 @@
-"""Running summaries of what came of a run: tracks, alerts and manoeuvres.
+"""Running summaries of what came of a run: tracks, alerts, manoeuvres, and who has which.
 
 They take the recorded rows as `components.display.summary` does.
 """
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
 from components.display.summary import Columns, rows_by_name
+from components.flights.closest_approach import STEP_S, regular_count
 from components.messages.alerts import AlertLevels
 from components.messages.columns import ORIGIN, POSITION
 from components.messages.state_tracks import StateTracks, held
 from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates
+from components.metrics.losses import closest
+from components.metrics.separation import RelativeFlight
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -48,13 +52,16 @@ def outcome_observers(simulation: Simulation) -> list[Observer]:
 class TrackSummary:
     """Counts each tracker's confirmed tracks, and how far they lie from the truth.
 
-    `targets` makes targets in the frame of an origin; None where no truth is recorded.
+    `targets` makes of a tracker what it may see in the frame of an origin, as it flies now; None
+    where no truth is recorded.
     """
 
     tables: ClassVar[frozenset[str]] = frozenset({TABLE})
 
     def __init__(self, trackers: Iterable[str], targets: Any = None) -> None:
-        self._entries = {name: _Tracker(targets) for name in trackers}
+        self._entries = {
+            name: _Tracker(None if targets is None else partial(targets, name)) for name in trackers
+        }
 
     def update(self, table: str, columns: Columns) -> None:
         """Take rows of ``state_tracks``."""
@@ -153,6 +160,67 @@ class ManoeuvreSummary:
         return {"manoeuvres": self._entries}
 
 
+#: Sections of a summary that are by block.
+_BY_BLOCK = ("sensors", "tracks", "late_looks", "alerts", "manoeuvres")
+
+
+class PlatformSummary:
+    """Says what each of several platforms carries, and its closest approaches as all flew."""
+
+    tables: ClassVar[frozenset[str]] = frozenset()
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+
+    def update(self, table: str, columns: Any) -> None:
+        """Take no rows."""
+
+    def result(self) -> dict[str, Any]:
+        """Return the section ``platforms``: name → ``blocks``, and of all but the ownship
+        ``targets``, as the section of that name has them of the ownship."""
+        blocks: dict[str, list[str]] = {}
+        for block, platform in sorted(self._simulation.platforms.items()):
+            blocks.setdefault(platform, []).append(block)
+        return {
+            "platforms": {
+                name: {"blocks": mine, **self._targets(name)} for name, mine in blocks.items()
+            }
+        }
+
+    def _targets(self, platform: str) -> dict[str, Any]:
+        end_s = float(self._simulation.duration_s)
+        for source in self._simulation.components.values():
+            if not isinstance(source, TrafficSource) or platform not in source.platforms()[1:]:
+                continue
+            viewer = source.roster.names.index(platform)
+            seen = [k for k in range(len(source.targets)) if k == viewer or k not in source.unseen]
+            count = regular_count(STEP_S, end_s)
+            flights = [RelativeFlight(source, k, STEP_S, count, end_s, viewer) for k in seen]
+            return {"targets": {flight.name: _approach(flight) for flight in flights}}
+        return {}
+
+
+def _approach(flight: RelativeFlight) -> dict[str, Any]:
+    range_m, time_s, at = closest(flight)
+    if not np.isfinite(range_m):
+        return {"closest_approach": None}
+    cut = {"at": at} if at else {}
+    return {"closest_approach": {"time_s": time_s, "range_m": range_m, **cut}}
+
+
+def on_board(summary: Mapping[str, Any], platform: str) -> dict[str, Any]:
+    """Return of a summary's sections by block what is on a platform, and whom that comes near."""
+    carried = summary["platforms"][platform]
+    blocks = set(carried["blocks"])
+    result: dict[str, Any] = {"targets": carried.get("targets", summary.get("targets"))}
+    for section in _BY_BLOCK:
+        every = summary.get(section) or {}
+        result[section] = {name: of for name, of in every.items() if name in blocks}
+    every = summary.get("fused") or {}
+    result["fused"] = {name: n for name, n in every.items() if blocks & {*name.split("+")}}
+    return {**result, "alerts_of": summary.get("alerts_of", {})}
+
+
 class _Tracker:
     """What is kept of one tracker."""
 
@@ -174,7 +242,7 @@ class _Tracker:
             return
         rows = rows[columns["has_range"][rows]]
         self._judged.update(np.unique(number[rows]).tolist())
-        if self._targets is None and len(rows):
+        if len(rows):
             self._targets = self._at(tuple(float(columns[n][rows[0]]) for n in ORIGIN))
         step = _MOST_AT_ONCE // max(1, len(self._targets.names) if self._targets else 1) + 1
         for start in range(0, len(rows), step):
@@ -226,12 +294,22 @@ def _first_result(first: tuple[float, float]) -> dict[str, float | None]:
 
 
 def _recorded_targets(simulation: Simulation) -> Any:
-    """Return what makes `TargetsInFrame` of an origin, where the truth is recorded."""
+    """Return what makes `TargetsInFrame` of a tracker's and an origin, where truth is recorded."""
     sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
     if not sources or not all(source.says_truth for source in sources):
         return None
-    targets = [target for source in sources for target in source.targets]
-    return lambda origin: TargetsInFrame(targets, origin)
+    return lambda tracker, origin: TargetsInFrame(seen_by(simulation, tracker), origin)
+
+
+def seen_by(simulation: Simulation, block: str) -> list[Any]:
+    """Return the flights, as known now, of all that a block's platform may see."""
+    sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
+    platform = simulation.components[block].context.platform
+    return [
+        flight
+        for source in sources
+        for flight in source.seen_from(platform if platform in source.platforms() else "")[1:]
+    ]
 
 
 def distances(columns: Columns, rows: Any, ned_m: FloatArray) -> FloatArray:

@@ -66,9 +66,10 @@ def draw_plan(
     reaches = {name: reach for name, reach in looks.items() if isinstance(reach, Reach)}
     mounted = {name: getattr(simulation.components[name], "axes", SensorAxes()) for name in reaches}
     outlines = {
-        name: outline_of(flights.start_yaw_rad, reach, mounted[name])
+        name: outline_of(yaw_rad, reach, mounted[name], start_km)
         for name, reach in reaches.items()
         if reach.enabled
+        for yaw_rad, start_km in [flights.start_of(simulation.components[name].context.platform)]
     }
     view = MapView(flights, marks, list(outlines.values()))
     width_in = _LEFT_IN + MAP_WIDTH_IN + _LEGEND_IN

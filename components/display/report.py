@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.display.outcomes import outcome_observers, senders
+from components.display.outcomes import PlatformSummary, outcome_observers, senders
 from components.display.summary import FusedSummary, SensorSummary
 from components.messages.detections import Detections
 from dsa_des.record.sinks import Observer
@@ -41,7 +41,8 @@ class DetectAndSenseReport:
         """
         sensors = sensor_names(simulation)
         off = [n for n in sensors if getattr(simulation.components[n].p, "enabled", True) is False]
-        return [SensorSummary(sensors, off), FusedSummary(), *outcome_observers(simulation)]
+        each = [PlatformSummary(simulation)] if simulation.platforms else []
+        return [SensorSummary(sensors, off), FusedSummary(), *outcome_observers(simulation), *each]
 
     def show(self, console: Any, summary: dict[str, Any]) -> None:
         """Print a run's summary on a ``rich.console.Console``; sections that lack are left out."""

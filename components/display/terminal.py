@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from components.display.outcomes import NEAR_M
+from components.display.outcomes import NEAR_M, on_board
 from dsa_des.record.undone import undone_sentences
 from dsa_des.text.safe_text import printable, shortened
 
@@ -12,7 +12,29 @@ MOST_IN_A_LINE = 4
 
 
 def show(console: Any, summary: dict[str, Any]) -> None:
-    """Print a run's summary: sensors, fusion, closest approaches, outcomes, attitude, speed."""
+    """Print a run's summary: sensors, fusion, closest approaches, outcomes, attitude, speed.
+
+    The first four platform by platform, where there are several.
+    """
+    for platform in summary.get("platforms") or ():
+        _print_line(console, f"On board of {platform}")
+        _show_chain(console, on_board(summary, platform), platform)
+        console.print()
+    if not summary.get("platforms"):
+        _show_chain(console, summary, "the ownship")
+    for line in undone_sentences(summary.get("undone") or {}):
+        _print_line(console, line)
+    for line in attitude_lines(summary.get("traffic") or {}):
+        _print_line(console, line)
+    speed = speed_text(summary.get("simulated_s"), summary.get("cpu_s"))
+    if speed:
+        _print_line(console, speed)
+    if summary.get("out"):
+        _print_line(console, f"Results in {summary['out']}")
+
+
+def _show_chain(console: Any, summary: dict[str, Any], platform: str) -> None:
+    """Print what came of the blocks on a platform."""
     if summary.get("sensors"):
         _print_table(
             console,
@@ -41,18 +63,9 @@ def show(console: Any, summary: dict[str, Any]) -> None:
             [(name, f"{count:,}") for name, count in _by_size(summary["fused"])],
         )
     if summary.get("targets"):
-        _show_closest(console, summary["targets"])
+        _show_closest(console, summary["targets"], platform)
     for line in outcome_lines(summary):
         _print_line(console, line)
-    for line in undone_sentences(summary.get("undone") or {}):
-        _print_line(console, line)
-    for line in attitude_lines(summary.get("traffic") or {}):
-        _print_line(console, line)
-    speed = speed_text(summary.get("simulated_s"), summary.get("cpu_s"))
-    if speed:
-        _print_line(console, speed)
-    if summary.get("out"):
-        _print_line(console, f"Results in {summary['out']}")
 
 
 def distance_text(range_m: float | None) -> str:
@@ -233,7 +246,7 @@ def _by_size(fused: dict[str, int]) -> list[tuple[str, int]]:
     return sorted(fused.items(), key=lambda item: (item[0].count("+"), item[0]))
 
 
-def _show_closest(console: Any, targets: dict[str, Any]) -> None:
+def _show_closest(console: Any, targets: dict[str, Any], platform: str) -> None:
     met = [
         (entry["closest_approach"], name)
         for name, entry in targets.items()
@@ -253,7 +266,7 @@ def _show_closest(console: Any, targets: dict[str, Any]) -> None:
     if len(met) > MOST_TARGETS:
         notes.append(f"{len(met) - MOST_TARGETS:,} more pass farther away")
     if len(met) < len(targets):
-        notes.append(f"{len(targets) - len(met):,} are never there together with the ownship")
+        notes.append(f"{len(targets) - len(met):,} are never there together with {platform}")
     title = "Closest approach to each target"
     if notes:
         title += f" ({'; '.join(notes)})"

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from components.display.outcomes import NEAR_M, TABLE, distances
+from components.display.outcomes import NEAR_M, TABLE, distances, seen_by
 from components.display.recorded_rows import each_row_group, row_count
 from components.display.symbols import DENSE, Labels, draw_density
 from components.messages.columns import ORIGIN, STATE
@@ -90,6 +90,10 @@ class DrawnTracks:
         self.targets = TargetsInFrame(targets, self.origin)
         self.tracks = []
         self.blocks = sorted(set(columns["block"].tolist()))
+        #: What each tracker may see.
+        self.seen_by = {
+            block: TargetsInFrame(seen_by(simulation, block), self.origin) for block in self.blocks
+        }
         several = len(self.blocks) > 1
         for index, block in enumerate(self.blocks):
             turn = index
@@ -97,7 +101,7 @@ class DrawnTracks:
             for number in np.unique(columns["track"][mine]).tolist():
                 rows = np.flatnonzero(mine & (columns["track"] == number))
                 one = {name: columns[name][rows] for name in columns}
-                near = distances(one, slice(None), self.targets.at(one["state_s"]))
+                near = distances(one, slice(None), self.seen_by[block].at(one["state_s"]))
                 # A comparison with nothing, as with what is not there, is false.
                 false = bool(len(targets)) and not bool((near < NEAR_M).any())
                 colour = _FALSE if false else COLOURS[turn % len(COLOURS)]

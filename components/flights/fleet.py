@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -11,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from components.geometry import TrajectoryState
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.column_values import constant
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 CELLS_AT_ONCE = 8192
 """Cells worked on together: the two dozen arrays in flight then stay in the processor's cache."""
@@ -159,3 +161,63 @@ class PieceSearch:
             low = np.where(begun, middle, low)
             high = np.where(begun, high, np.maximum(middle - 1, low))
         return low
+
+
+class LoneFlight(Fleet):
+    """A flight of a kind that no fleet is made for."""
+
+    def __init__(self, flight: Any) -> None:
+        self._flight = flight
+
+    def __len__(self) -> int:
+        return 1
+
+    def __getitem__(self, index: int) -> Any:  # type: ignore[override]
+        return (self._flight,)[index]
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return its states at times (n,), in s."""
+        state: TrajectoryState = self._flight.at(time_s)
+        return state
+
+
+@dataclass(frozen=True, eq=False)
+class FormulaGroup:
+    """Flights of one leg each that share a formula: one array expression."""
+
+    formula: Callable[[FloatArray, FloatArray], tuple[FloatArray, ...]]
+    columns: IntArray
+    table: FloatArray
+    times_s: tuple[FloatArray, FloatArray, FloatArray]
+    attitude: FloatArray
+    yaw_is_fixed: BoolArray
+
+    def at(self, times: FloatArray) -> TrajectoryState:
+        """Return the group's states, (times, flights); angles that never change, once for all."""
+        start_s, end_s, until_s = self.times_s
+        shape = len(times), len(start_s)
+        moving: list[FloatArray] = []
+        present = np.empty(shape, dtype=bool)
+        rows = max(1, CELLS_AT_ONCE // len(start_s))
+        for first in range(0, len(times), rows):
+            block = slice(first, first + rows)
+            t = times[block, np.newaxis]
+            inside = np.maximum(t, start_s)
+            np.minimum(inside, until_s, out=inside)
+            inside -= start_s
+            now = self.formula(self.table, inside)
+            # Of flights that keep their altitude one row of them is for all times.
+            moving = moving or [
+                np.empty(shape) if len(v) == len(inside) else constant(v[0], len(times), v.dtype)
+                for v in now
+            ]
+            for out, values in zip(moving, now, strict=True):
+                if out.flags.writeable:
+                    out[block] = values
+            np.logical_and(t >= start_s, t <= end_s, out=present[block])
+        lat, lon, alt, yaw = moving or np.empty((4, *shape))
+        fixed_yaw, *others = self.attitude
+        pitch, roll = (constant(angle, len(times), angle.dtype) for angle in others)
+        if np.count_nonzero(self.yaw_is_fixed):
+            yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
+        return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)

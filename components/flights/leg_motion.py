@@ -1,4 +1,4 @@
-"""Segments of a scripted flight, each with an exact closed form: geodesics, turns, and holds."""
+"""Segments of flights, each with a closed form: geodesics, turns, holds, and ramps of velocity."""
 
 from __future__ import annotations
 
@@ -20,6 +20,9 @@ from components.geometry import (
     wrap_heading_rad,
 )
 from dsa_des.arrays.types import FloatArray
+
+#: Parts east and north.
+Pair = tuple[FloatArray, FloatArray]
 
 LARGEST_TURN_RADIUS_M = 200_000.0
 """Up to here a turn keeps its speed to 2e-4; the error grows with the radius, 1e-6 at 1 km."""
@@ -116,6 +119,19 @@ def turn_state(
         -table[_RADIUS] * sine * table[_PER_NORTH],
     )
     rho = np.sqrt(east * east + north * north)
+    lat, lon, to_east, to_north = _on_chart(table, (east, north), (d_east, d_north), rho)
+    direction = np.where(table[_RATE] + 0.0 * rho > 0.0, 1.0, -1.0)
+    yaw = wrap_heading_rad(np.arctan2(to_east * direction, to_north * direction))
+    return lat, lon, table[_ALT] + table[_CLIMB] * elapsed, yaw
+
+
+def _on_chart(
+    table: FloatArray, offset: Pair, motion: Pair, rho: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return latitude and longitude (deg) of offsets from a place, as angles, and the direction of
+    motions east and north there; `rho` is how far off they are, above 0.
+    """
+    (east, north), (d_east, d_north) = offset, motion
     sin_rho, cos_rho = np.sin(rho), np.cos(rho)
     sinc = sin_rho / rho
     d_rho = (east * d_east + north * d_north) / rho
@@ -137,12 +153,72 @@ def turn_state(
     to_east = x * dy - y * dx
     to_north = level * dz - z * (x * dx + y * dy)
     to_north = to_north * ((1.0 - ECCENTRICITY_SQUARED) / (1.0 - ECCENTRICITY_SQUARED * z * z))
-    direction = np.where(table[_RATE] + 0.0 * rho > 0.0, 1.0, -1.0)
-    yaw = wrap_heading_rad(np.arctan2(to_east * direction, to_north * direction))
-    return lat, lon, table[_ALT] + table[_CLIMB] * elapsed, yaw
+    return lat, lon, to_east, to_north
 
 
-Kind = Literal["geodesic", "turn", "hold"]
+# Rows of a ramp from 9 on: those of its chart, its velocity at first and how that changes, for how
+# long, its altitude, and where its nose points while it stands.
+_FROM_EAST, _FROM_NORTH, _MORE_EAST, _MORE_NORTH, _LASTS, _LEVEL, _NOSE = range(11, 18)
+# Who is slower stands; and offsets are no less than this, as angles, for their direction.
+_STANDS_MPS, _LEAST_ANGLE = 1e-6, 1e-15
+
+
+def ramp_parameters(
+    position: tuple[FloatArray, FloatArray, FloatArray],
+    yaw_rad: FloatArray,
+    velocity_mps: Pair,
+    wanted_mps: Pair,
+    acceleration_mps2: FloatArray,
+) -> FloatArray:
+    """Prepare ramps (rows, n): from velocities (east, north) straight to others, then on at these.
+
+    `position` is latitude and longitude (deg) and altitude (m), (n,) each.
+    """
+    lat_deg, lon_deg, alt_m = position
+    change = wanted_mps[0] - velocity_mps[0], wanted_mps[1] - velocity_mps[1]
+    lasts_s = np.hypot(*change) / acceleration_mps2
+    at_once = np.where(lasts_s > 0.0, lasts_s, 1.0)
+    meridian, prime_vertical = radii_of_curvature(lat_deg)
+    east, north, up = (np.array(axis) for axis in local_axes(lat_deg, lon_deg))
+    rows = (
+        1.0 / (prime_vertical + alt_m), 1.0 / (meridian + alt_m), *velocity_mps,
+        change[0] / at_once, change[1] / at_once, lasts_s, alt_m, yaw_rad,
+    )  # fmt: skip
+    return np.concatenate([east, north, up, np.stack(rows)])
+
+
+def ramp_velocity(table: FloatArray, elapsed: FloatArray) -> Pair:
+    """Return the velocity east and north, m/s, in the axes of where a ramp begins."""
+    gone = np.minimum(elapsed, table[_LASTS])
+    return (
+        table[_FROM_EAST] + table[_MORE_EAST] * gone,
+        table[_FROM_NORTH] + table[_MORE_NORTH] * gone,
+    )
+
+
+def ramp_state(
+    table: FloatArray, elapsed: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Evaluate ramps: level flight whose velocity changes steadily at first.
+
+    The way is v t + a (T t - T²/2) with T the time gone of the change, along an arc with the radii
+    of where it begins: over 10 km it keeps its length to 0.5 m.
+    """
+    gone = np.minimum(elapsed, table[_LASTS])
+    more = gone * elapsed - 0.5 * gone * gone
+    offset = (
+        (table[_FROM_EAST] * elapsed + table[_MORE_EAST] * more) * table[_PER_EAST],
+        (table[_FROM_NORTH] * elapsed + table[_MORE_NORTH] * more) * table[_PER_NORTH],
+    )
+    velocity = ramp_velocity(table, elapsed)
+    motion = velocity[0] * table[_PER_EAST], velocity[1] * table[_PER_NORTH]
+    rho = np.maximum(np.hypot(*offset), _LEAST_ANGLE)
+    lat, lon, to_east, to_north = _on_chart(table, offset, motion, rho)
+    nose = np.where(np.hypot(*velocity) > _STANDS_MPS, np.arctan2(to_east, to_north), table[_NOSE])
+    return lat, lon, table[_LEVEL] + 0.0 * elapsed, wrap_heading_rad(nose)
+
+
+Kind = Literal["geodesic", "turn", "hold", "ramp"]
 
 
 @dataclass(frozen=True)
@@ -151,6 +227,7 @@ class Segment:
     flight, and the attitude that follows from the motion; its speed is along the path, climb
     included.
 
+    A "ramp" is level, from one velocity to another (`ramp_parameters`), with its largest speed.
     A "hold" stays in one position, and may climb and turn on the spot; the rows of its table are
     lat_deg, lon_deg, alt_m, climb_mps, yaw_rad and rate_rad_s.
     """
@@ -173,5 +250,7 @@ def hold_state(
     return zero + table[0], zero + table[1], table[2] + table[3] * elapsed, yaw
 
 
-FORMULAS = {"geodesic": geodesic_state, "turn": turn_state, "hold": hold_state}
-KINDS: tuple[Kind, ...] = ("geodesic", "turn", "hold")
+FORMULAS = {
+    "geodesic": geodesic_state, "turn": turn_state, "hold": hold_state, "ramp": ramp_state,
+}  # fmt: skip
+KINDS: tuple[Kind, ...] = ("geodesic", "turn", "hold", "ramp")

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from components.flights.fleet import Fleet, Trajectory, in_rows
+from components.flights.fleet import Fleet, LoneFlight, Trajectory, in_rows
 from components.flights.geodesic_motion import geodesic_parameters
-from components.flights.leg_motion import KINDS
+from components.flights.leg_motion import KINDS, ramp_parameters
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.flights.scripted_flights import MOST_ALT_M, ScriptedFleet, ScriptedTrajectory
-from components.flights.steering_plan import SteeredPart, flown_from, times_around_s
+from components.flights.steering_plan import SteeredPart, chords, flown_from, times_around_s
 from components.geometry import TrajectoryState, heading_from_deg, wrap_longitude_deg
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -81,7 +81,7 @@ def straight_fleet(
 
 
 #: What an ownship flies after each of its manoeuvres, and from when on, s.
-Parts = tuple[tuple[float, SteeredPart], ...]
+Parts = tuple[tuple[float, ScriptedTrajectory], ...]
 
 
 class SteeredFleet(Fleet):
@@ -99,8 +99,12 @@ class SteeredFleet(Fleet):
         #: How many parts each of them has.
         self.manoeuvre_count = np.zeros(len(flights), dtype=np.int64)
         self.manoeuvre_count[: len(parts)] = [len(of_one) for of_one in parts]
-        self._flown = [flight for of_one in parts for _, flight in of_one]
-        self._parts = ScriptedFleet(self._flown)
+        flown = [flight for of_one in parts for _, flight in of_one]
+        self._parts = ScriptedFleet(flown)
+        #: Each part with its plan; None of those on a ramp.
+        self._flown: list[SteeredPart | None] = [
+            one if isinstance(one, SteeredPart) else None for one in flown
+        ]
         #: Of each ownship: when its parts begin, in order, and which they are.
         room = len(flights), int(self.manoeuvre_count.max(initial=0)) + 1
         self._start_s, self._part = np.full(room, np.inf), np.zeros(room, dtype=np.int64)
@@ -123,7 +127,7 @@ class SteeredFleet(Fleet):
         """Return what an ownship flies after its manoeuvres."""
         count = int(self.manoeuvre_count[ownship])
         starts_s, numbers = self._start_s[ownship, :count], self._part[ownship, :count]
-        flown = (self._flown[number] for number in numbers.tolist())
+        flown = (self._flown[n] or self._parts[n] for n in numbers.tolist())
         return tuple(zip(starts_s.tolist(), flown, strict=True))
 
     def each(
@@ -193,22 +197,78 @@ class SteeredFleet(Fleet):
         return np.asarray(np.where(begun, speeds, 0.0).max(axis=1))
 
     def steered(
-        self, ownship: IntArray, time_s: FloatArray, manoeuvres: Sequence[Manoeuvre]
+        self,
+        ownship: IntArray,
+        time_s: FloatArray,
+        manoeuvres: Sequence[Manoeuvre] | FloatArray,
     ) -> SteeredFleet:
         """Return the flights with manoeuvres of ownships (each once) from times on, none before
         an earlier one, beside what they still do.
 
         A turn or a change of altitude begins and ends at once, without a change of speed along the
-        path's projection and without acceleration upward; speeds change steadily.
+        path's projection and without acceleration upward; speeds change steadily. A velocity is
+        come to by a ramp, level; what is commanded after it begins with the motion of that instant.
         """
-        times_s = times_around_s(time_s)
-        around = self.each(np.repeat(ownship, times_s.shape[1]), times_s.reshape(-1))
-        around = around.reshaped(times_s.shape)
+        given = np.array(manoeuvres, dtype=np.float64).reshape(-1, len(Manoeuvre._fields))
+        ramps = ~np.isnan(given[:, _VELOCITY[0]])
+        if ramps.any():
+            mine, others = ramps.nonzero()[0], (~ramps).nonzero()[0]
+            new = self._ramps(ownship[mine], time_s[mine], given[mine])
+            fleet = self._with_parts(ownship[mine], time_s[mine], new, [None] * len(mine))
+            if not len(others):
+                return fleet
+            return fleet.steered(ownship[others], time_s[others], given[others])
+        around = self._around(ownship, time_s)
         before = [
             self._flown[self._part[own, count - 1]] if count else None
             for own, count in zip(ownship, self.manoeuvre_count[ownship], strict=True)
         ]
-        new = flown_from("ownship", around, time_s, manoeuvres, before)
+        every = [Manoeuvre(*row) for row in given.tolist()]
+        flown = flown_from("ownship", around, time_s, every, before)
+        return self._with_parts(ownship, time_s, ScriptedFleet(flown), flown)
+
+    def _around(self, ownship: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return where ownships are around times (n,), as at `times_around_s`, (n, 3)."""
+        times_s = times_around_s(time_s)
+        around = self.each(np.repeat(ownship, times_s.shape[1]), times_s.reshape(-1))
+        return around.reshaped(times_s.shape)
+
+    def _ramps(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> ScriptedFleet:
+        """Return what ownships fly from their velocities at times (n,) to commanded ones."""
+        _, after, which = self._part_flown(ownship, time_s, None)
+        velocity = np.full((2, len(time_s)), np.nan)
+        velocity[:, after] = self._parts.ramp_velocities_mps(which, time_s[after])
+        here = self.each(ownship, time_s)
+        rest = np.isnan(velocity[0]).nonzero()[0]
+        if len(rest):
+            around = self._around(ownship[rest], time_s[rest])
+            north_m, east_m, base_s = np.array(chords(around, time_s[rest])).T
+            velocity[:, rest] = east_m / base_s, north_m / base_s
+        east, north, acceleration = (given[:, place] for place in _VELOCITY)
+        table = ramp_parameters(
+            (here.lat_deg, here.lon_deg, here.alt_m), here.yaw_rad, (velocity[0], velocity[1]),
+            (east, north), acceleration,
+        )  # fmt: skip
+        fastest = np.maximum(np.hypot(*velocity), np.hypot(east, north))
+        zero, kind = np.zeros(len(time_s)), KINDS.index("ramp")
+        return ScriptedFleet.of_columns(
+            ["ownship"] * len(time_s),
+            np.stack([time_s, zero + inf]),
+            np.full((3, len(time_s)), np.nan),
+            np.ones(len(time_s), dtype=np.int64),
+            np.stack([zero, zero, zero, fastest]),
+            np.full(len(time_s), kind, dtype=np.int64),
+            {kind: table},
+        )
+
+    def _with_parts(
+        self,
+        ownship: IntArray,
+        time_s: FloatArray,
+        new: ScriptedFleet,
+        flown: Sequence[SteeredPart | None],
+    ) -> SteeredFleet:
+        """Return the flights with a new part of each of some ownships from times on."""
         fleet = copy(self)
         fleet._parts = self._parts.with_flights(new)
         index = self.manoeuvre_count[ownship]
@@ -219,10 +279,15 @@ class SteeredFleet(Fleet):
         fleet._part[ownship, index] = len(self._flown) + np.arange(len(new))
         fleet.manoeuvre_count = self.manoeuvre_count.copy()
         fleet.manoeuvre_count[ownship] += 1
-        fleet._flown = self._flown + new
+        fleet._flown = [*self._flown, *flown]
         return fleet
 
 
+#: Where what commands a velocity stands in a manoeuvre: east, north, and the acceleration to it.
+_VELOCITY = [
+    Manoeuvre._fields.index(name)
+    for name in ("velocity_east_mps", "velocity_north_mps", "acceleration_mps2")
+]
 _NOBODY: IntArray = np.empty(0, dtype=np.int64)
 
 
@@ -263,24 +328,6 @@ class SteeredFlight:
         return state.reshaped(times.shape)
 
 
-class _Alone(Fleet):
-    """A flight of a kind that no fleet is made for."""
-
-    def __init__(self, flight: Any) -> None:
-        self._flight = flight
-
-    def __len__(self) -> int:
-        return 1
-
-    def __getitem__(self, index: int) -> Any:  # type: ignore[override]
-        return (self._flight,)[index]
-
-    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return its states at times (n,), in s."""
-        state: TrajectoryState = self._flight.at(time_s)
-        return state
-
-
 class MixedFleet(Fleet):
     """Flights of several kinds, a fleet of each."""
 
@@ -293,7 +340,7 @@ class MixedFleet(Fleet):
         for kind in dict.fromkeys(kinds):
             numbers = [number for number, one in enumerate(kinds) if one is kind]
             of_kind = [flights[number] for number in numbers]
-            made = [_FLEETS[kind](of_kind)] if kind in _FLEETS else [_Alone(f) for f in of_kind]
+            made = [_FLEETS[kind](of_kind)] if kind in _FLEETS else [LoneFlight(f) for f in of_kind]
             self._fleet[numbers] = len(self._fleets) + np.arange(len(numbers)) % len(made)
             self._index[numbers] = np.arange(len(numbers)) // len(made)
             self._fleets += made

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
 from functools import cached_property
 from math import inf, isfinite, isnan, radians
 from typing import Any
@@ -13,14 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from components.flights.fleet import (
-    CELLS_AT_ONCE,
     Fleet,
+    FormulaGroup,
     PieceSearch,
     checked_times,
     empty_state,
     in_blocks,
 )
-from components.flights.leg_motion import FORMULAS, KINDS, Segment
+from components.flights.leg_motion import FORMULAS, KINDS, Segment, ramp_velocity
 from components.flights.legs import AnyLeg, LegBuilder, require
 from components.geometry import (
     TrajectoryState,
@@ -28,8 +27,7 @@ from components.geometry import (
     heading_from_deg,
     wrap_longitude_deg,
 )
-from dsa_des.arrays.column_values import constant
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 LONGEST_FLIGHT_S = 1e12
 """Flights are held up to here (30,000 years) and stand still after, so that nothing overflows."""
@@ -37,7 +35,7 @@ MOST_ALT_M = 1e6
 """No flight starts farther above or below the ellipsoid."""
 
 _BY_KIND = [FORMULAS[kind] for kind in KINDS]
-_STRAIGHT, _HOLD = KINDS.index("geodesic"), KINDS.index("hold")
+_STRAIGHT, _HOLD, _RAMP = (KINDS.index(kind) for kind in ("geodesic", "hold", "ramp"))
 
 
 class ScriptedTrajectory:
@@ -199,15 +197,31 @@ class ScriptedFleet(Fleet):
         fleet._set(*columns)
         return fleet
 
-    def with_flights(self, flights: Sequence[ScriptedTrajectory]) -> ScriptedFleet:
-        """Return a fleet, which is no subset, with more flights at its end."""
-        names, *others, tables = _columns_of(flights)
-        mine = (self._between_s, self._fixed_rad, self._counts, self._legs, self._kind)
-        columns = [np.concatenate(both, axis=-1) for both in zip(mine, others, strict=True)]
-        for kind, table in self._tables.items():
-            known = [table, tables[kind]] if kind in tables else [table]
-            tables[kind] = np.concatenate(known, axis=-1)
-        return self.of_columns([*self._names, *names], *columns, tables)
+    def with_flights(self, flights: ScriptedFleet) -> ScriptedFleet:
+        """Return a fleet with more flights at its end; neither is a subset."""
+        pairs = zip(self._all_columns(), flights._all_columns(), strict=True)
+        columns = [np.concatenate(both, axis=-1) for both in pairs]
+        mine, others = self._tables, flights._tables
+        tables = {
+            kind: np.concatenate([of[kind] for of in (mine, others) if kind in of], axis=-1)
+            for kind in sorted({*mine, *others})
+        }
+        return self.of_columns([*self._names, *flights._names], *columns, tables)
+
+    def _all_columns(self) -> tuple[AnyArray, ...]:
+        return self._between_s, self._fixed_rad, self._counts, self._legs, self._kind
+
+    def ramp_velocities_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return velocities east and north (2, n), asked for as in `each`, where flights are on a
+        ramp, else NaN.
+        """
+        leg, elapsed = self._legs_at(self._columns[aircraft], time_s)
+        velocity = np.full((2, len(leg)), np.nan)
+        on = np.flatnonzero(self._kind[leg] == _RAMP)
+        if len(on):
+            table = self._tables[_RAMP].take(self._slot[leg[on]], axis=1)
+            velocity[:, on] = ramp_velocity(table, elapsed[on])
+        return velocity
 
     def subset(self, columns: IntArray) -> ScriptedFleet:
         """Return the fleet of some flights, without preparing them anew."""
@@ -302,14 +316,18 @@ class ScriptedFleet(Fleet):
         """Return single aircraft's speeds over ground (n,), each at a time (n,) of its own."""
         leg, _ = self._legs_at(self._columns[aircraft], time_s)
         level = self._legs[3][leg] * np.cos(self._legs[1][leg])
-        return np.where(self._kind[leg] == _HOLD, 0.0, level)
+        level = np.where(self._kind[leg] == _HOLD, 0.0, level)
+        if _RAMP not in self._tables:
+            return level
+        ramps_mps = np.hypot(*self.ramp_velocities_mps(aircraft, time_s))
+        return np.where(np.isnan(ramps_mps), level, ramps_mps)
 
     def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
         """Return fixed yaw, pitch and roll (3, n), NaN where the motion gives them."""
         return self._fixed_rad[:, self._columns[aircraft]]
 
     @cached_property
-    def _parts(self) -> tuple[list[_Group], IntArray]:
+    def _parts(self) -> tuple[list[FormulaGroup], IntArray]:
         """Flights of one leg each, straight or held, by formula; and the indices of the others."""
         flights = self._columns
         leg = self._find.first[flights]
@@ -323,7 +341,7 @@ class ScriptedFleet(Fleet):
             fixed = self._fixed_rad[:, of]
             derived = np.stack((np.full(len(of), np.nan), *self._legs[1:3, legs]))
             groups.append(
-                _Group(
+                FormulaGroup(
                     _BY_KIND[kind],
                     members,
                     self._tables[kind].take(self._slot[legs], axis=1)[:, np.newaxis],
@@ -353,45 +371,3 @@ def _columns_of(flights: Sequence[ScriptedTrajectory]) -> tuple[Any, ...]:
         np.array(kinds, dtype=np.int64),
         {kind: np.stack(rows, axis=-1) for kind, rows in tables.items()},
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Group:
-    """Flights of one leg each that share a formula: one array expression."""
-
-    formula: Callable[[FloatArray, FloatArray], tuple[FloatArray, ...]]
-    columns: IntArray
-    table: FloatArray
-    times_s: tuple[FloatArray, FloatArray, FloatArray]
-    attitude: FloatArray
-    yaw_is_fixed: BoolArray
-
-    def at(self, times: FloatArray) -> TrajectoryState:
-        """Return the group's states, (times, flights); angles that never change, once for all."""
-        start_s, end_s, until_s = self.times_s
-        shape = len(times), len(start_s)
-        moving: list[FloatArray] = []
-        present = np.empty(shape, dtype=bool)
-        rows = max(1, CELLS_AT_ONCE // len(start_s))
-        for first in range(0, len(times), rows):
-            block = slice(first, first + rows)
-            t = times[block, np.newaxis]
-            inside = np.maximum(t, start_s)
-            np.minimum(inside, until_s, out=inside)
-            inside -= start_s
-            now = self.formula(self.table, inside)
-            # Of flights that keep their altitude one row of them is for all times.
-            moving = moving or [
-                np.empty(shape) if len(v) == len(inside) else constant(v[0], len(times), v.dtype)
-                for v in now
-            ]
-            for out, values in zip(moving, now, strict=True):
-                if out.flags.writeable:
-                    out[block] = values
-            np.logical_and(t >= start_s, t <= end_s, out=present[block])
-        lat, lon, alt, yaw = moving or np.empty((4, *shape))
-        fixed_yaw, *others = self.attitude
-        pitch, roll = (constant(angle, len(times), angle.dtype) for angle in others)
-        if np.count_nonzero(self.yaw_is_fixed):
-            yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
-        return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)

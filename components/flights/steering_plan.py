@@ -225,13 +225,13 @@ def flown_from(
     earlier manoeuvre, `before`, that are not commanded anew go on.
     """
     flown = []
-    chords = _chords(around, time_s) if any(one is None for one in before) else []
+    ways = chords(around, time_s) if any(one is None for one in before) else []
     rows = zip(time_s.tolist(), manoeuvres, before, strict=True)
     for row, (at_s, manoeuvre, earlier) in enumerate(rows):
         low, here, high = around.alt_m[row].tolist()
         position = float(around.lat_deg[row, 1]), float(around.lon_deg[row, 1]), here
         if earlier is None:
-            north_m, east_m, base_s = chords[row]
+            north_m, east_m, base_s = ways[row]
             heading_deg = math.degrees(math.atan2(east_m, north_m))
             speed_mps = math.hypot(north_m, east_m) / base_s
             plan = SteeringPlan((), (), _own_climb((high - low) / base_s, manoeuvre), (), speed_mps)
@@ -254,7 +254,7 @@ def flown_from(
     return flown
 
 
-def _chords(around: TrajectoryState, time_s: FloatArray) -> list[list[float]]:
+def chords(around: TrajectoryState, time_s: FloatArray) -> list[list[float]]:
     """Return the way from before to after each time, north and east, m, and how long it takes, s.
 
     Its ends are seen from its middle, so that the track is the one there.

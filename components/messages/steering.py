@@ -1,13 +1,14 @@
 """The message of an avoidance block to the ownship."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from dsa_des.arrays.run_ticks import RunTicks
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import PER_ROW, Message, column
 
 #: Slower turns are none: at 340 m/s their radius is beyond the 200 km that flights can have.
@@ -44,6 +45,9 @@ class Manoeuvre(NamedTuple):
     eases_rad : float
         Within so much of that track the rate falls in proportion, and the bank takes its time;
         above 0 where a track is turned to.
+    velocity_east_mps, velocity_north_mps : float
+        Of a multirotor, in place of all of these: velocity over the ground, level, to which its own
+        moves straight by at most `acceleration_mps2`; NaN for none.
     """
 
     turn_rad: float = 0.0
@@ -58,6 +62,8 @@ class Manoeuvre(NamedTuple):
     roll_rate_rad_s: float = 0.0
     heading_rad: float = 0.0
     eases_rad: float = 0.0
+    velocity_east_mps: float = math.nan
+    velocity_north_mps: float = math.nan
 
 
 @dataclass(eq=False)
@@ -108,7 +114,7 @@ class Manoeuvres(Message):
     def __post_init__(self) -> None:
         """Fill in what is not changed."""
         super().__post_init__()
-        for name in Manoeuvre._fields[2:]:
+        for name in self._given()[2:]:
             if getattr(self, name) is None:
                 setattr(self, name, np.zeros(len(self.tick)))
 
@@ -116,7 +122,21 @@ class Manoeuvres(Message):
     def of(cls, ticks: Sequence[int], manoeuvres: Sequence[Manoeuvre]) -> Self:
         """Return the message of manoeuvres, each at an instant of its own."""
         parts = np.array(manoeuvres, dtype=np.float64).reshape(-1, len(Manoeuvre._fields)).T
-        return cls(np.array(ticks, dtype=np.int64), *(part.copy() for part in parts))
+        given: dict[str, Any] = dict(zip(Manoeuvre._fields, parts, strict=True))
+        return cls(
+            np.array(ticks, dtype=np.int64), **{name: given[name].copy() for name in cls._given()}
+        )
+
+    @classmethod
+    def _given(cls) -> list[str]:
+        """Return which parts of a `Manoeuvre` it holds."""
+        return [name for name in Manoeuvre._fields if name in cls.__dataclass_fields__]
+
+    def manoeuvres(self) -> FloatArray:
+        """Return a row (fields of `Manoeuvre`,) of each row."""
+        none, given = np.full(len(self.tick), math.nan), self._given()
+        parts = [getattr(self, name) if name in given else none for name in Manoeuvre._fields]
+        return np.stack(parts, axis=-1)
 
     @classmethod
     def at_rows(cls, instants: RunTicks, manoeuvres: Mapping[int, Manoeuvre]) -> Self | None:
@@ -131,3 +151,45 @@ class Manoeuvres(Message):
     def initial(cls, values: Mapping[str, object]) -> Self:
         """Refuse: before the first manoeuvre there is none, ``holds = "nothing"``."""
         raise ValueError("no manoeuvre can be written in a scene; allowed: 'nothing'")
+
+
+@dataclass(eq=False)
+class Velocities(Manoeuvres):
+    """Velocities that a multirotor is to fly, with the acceleration by which it comes to them."""
+
+    velocity_east_mps: FloatArray = column(
+        "m/s", "", "commanded velocity over the ground, east", of=PER_ROW, default=None
+    )
+    velocity_north_mps: FloatArray = column(
+        "m/s", "", "commanded velocity over the ground, north", of=PER_ROW, default=None
+    )
+
+
+@dataclass(eq=False)
+class ChosenSides(Message):
+    """Which side one who steers has chosen, told to others that coordinate with it.
+
+    Parameters
+    ----------
+    address : (rows,) of int
+        Whose choice it is; of two, the lower one goes first.
+    side : (rows,) of int
+        1 to the right or up, -1 to the left or down.
+    """
+
+    row_table = "sides"
+
+    address: IntArray = column("", "", "address of who chose", "int64", of=PER_ROW)
+    side: IntArray = column(
+        "", "", "1: to the right, or up; -1: to the left, or down", "int64", of=PER_ROW
+    )
+
+    @classmethod
+    def at_rows(cls, instants: RunTicks, address: int, sides: Mapping[int, int]) -> Self | None:
+        """Return the sides chosen at some instants, by these' positions; None without any."""
+        rows = sorted(row for row, side in sides.items() if side)
+        if not rows:
+            return None
+        some = instants.take(np.array(rows))
+        chosen = np.array([sides[row] for row in rows], dtype=np.int64)
+        return cls(some.tick, np.full(len(rows), address), chosen).of_runs(some.run)

@@ -17,11 +17,12 @@ from components.metrics.separation import (
     traffic_block,
     traffic_of,
 )
+from components.metrics.true_states import Coverage
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.platforms import platforms_of
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import Group
+from dsa_des.studies.metric import Group, Metric
 
 _COLUMNS = Manoeuvre._fields
 
@@ -94,6 +95,22 @@ class FlownMetric(TargetMetric):
                 self.delays_s[wire.source] = float(wire.total_delay_s)
         if self.delays_s:
             self.tables = {**self.tables, "manoeuvres": ("block", "time_s", *_COLUMNS)}
+
+    def flights_seen(self, group: Group, number: int) -> list[Any]:
+        """Return the flights of who looks in a replica, as steered, and then of all it may see."""
+        source = traffic_of(group.scenes[number])[0]
+        own, *others = source.seen_from(source.platforms()[self.viewer + 1])
+        told = _by_platform(self._told(group).get(number, ()))
+        places = [place for place in range(len(source.targets)) if place not in source.unseen]
+        places = sorted({*places, self.viewer} - {-1})
+        flights = [own, *others]
+        of_each = [self.viewer, *(-1 if place == self.viewer else place for place in places)]
+        for at, place in enumerate(of_each):
+            if there := _while_there(place, flights[at], told.get(place, ())):
+                name = flights[at].name
+                (flights[at],) = flown_as_steered([flights[at]], [there])
+                flights[at].name = name
+        return flights
 
     def on_platform(self, blocks: Sequence[str]) -> list[str]:
         """Return those of some blocks that are on the platform that looks."""
@@ -310,3 +327,33 @@ def _while_there(place: int, flight: Any, steering: Steering) -> Steering:
         return steering
     first_s, last_s = flight.interval_present()
     return [one for one in steering if first_s <= one[0] <= last_s]
+
+
+class PlatformTracks(Metric):
+    """A metric of the tracks on the ownship, or on the platform that the parameters name.
+
+    Flights are those planned; as steered where blocks are on several platforms.
+    """
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene)
+        several = any(block.options.platform for block in scene.blocks.values())
+        named = parameters.platform is not None
+        self._flown = FlownMetric(parameters, scene) if several or named else None
+        if self._flown is not None:
+            self.tables = {**self._flown.tables, **self.tables}
+
+    def mine(self, blocks: Sequence[str]) -> list[str]:
+        """Return those of some blocks that are on the platform."""
+        return [*blocks] if self._flown is None else self._flown.on_platform(blocks)
+
+    def flights(self, group: Group, number: int) -> list[Any]:
+        """Return the flights of the platform in a replica, and of all that it may see."""
+        if self._flown is None:
+            flights: list[Any] = traffic_of(group.scenes[number])[0].seen_from()
+            return flights
+        return self._flown.flights_seen(group, number)
+
+    def coverage(self, scene: Scene, flights: Sequence[Any]) -> Coverage:
+        """Return what of these flights the platform's sensors cover."""
+        return Coverage(scene, flights, self.mine([*scene.blocks]))

@@ -72,16 +72,6 @@ def traffic_of(scene: Scene) -> tuple[Any, float]:
     return source, float(duration)
 
 
-def refuse_other_platforms(scene: Scene) -> None:
-    """Refuse a scene with blocks on others than the ownship, for what measures tracks by it."""
-    for name, block in scene.blocks.items():
-        if block.options.platform is not None:
-            raise ValueError(
-                f"blocks.{name}.platform is {block.options.platform!r}: tracks are measured by "
-                "the ownship's flight, and those of other platforms not yet"
-            )
-
-
 def separations(
     scene: Scene, step_s: float | None, until_s: float = math.inf, viewer: int = -1
 ) -> "list[RelativeFlight]":

@@ -15,12 +15,12 @@ from pydantic import Field
 from components.arguments.units import NAUTICAL_MILE_M
 from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import held
-from components.metrics.separation import refuse_other_platforms
+from components.metrics.flown_flights import PlatformTracks
+from components.metrics.rows import PlatformParameters
 from components.metrics.true_states import Coverage, position_in_frame, states_in_frame
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.component import Parameters
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import EVENT, NUMBER, Group, Metric, Result
+from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
 
 _TABLE = "state_tracks"
 _ERRORS = {
@@ -32,7 +32,7 @@ _ERRORS = {
 }
 
 
-class ErrorsByRangeParameters(Parameters):
+class ErrorsByRangeParameters(PlatformParameters):
     """At which ranges, and which share of the errors lies within the result."""
 
     ranges_nmi: tuple[float, ...] = Field(
@@ -57,7 +57,7 @@ class ErrorsByRangeParameters(Parameters):
     )
 
 
-class ErrorsByRange(Metric):
+class ErrorsByRange(PlatformTracks):
     """Quantiles of the errors of confirmed tracks at given ranges, and the share with a track."""
 
     Parameters = ErrorsByRangeParameters
@@ -65,7 +65,6 @@ class ErrorsByRange(Metric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        refuse_other_platforms(scene)
         if any(not 0.0 < r <= 1000.0 for r in self.p.ranges_nmi):
             raise ValueError("ranges_nmi: must lie above 0, at most 1000")
         if len(set(self.p.ranges_nmi)) < len(self.p.ranges_nmi):
@@ -89,18 +88,23 @@ class ErrorsByRange(Metric):
         values = {result.name: np.full(len(group), np.nan) for result in self.results()}
         columns: Any = group.tables[_TABLE]
         kept = held(columns["track_status"]) & np.asarray(columns["has_range"], dtype=bool)
+        names = columns["block"].names
+        aboard = [names.index(name) for name in self.mine(names)]
+        kept &= np.isin(columns["block"].codes, aboard)
         replica = np.asarray(columns["replica"])[kept]
         rows = np.flatnonzero(kept)
         starts = np.searchsorted(replica, np.arange(len(group) + 1))
         for number, scene in enumerate(group.scenes):
             mine = rows[starts[number] : starts[number + 1]]
             end_s = float(group.duration_s[number])
-            for name, value in self._of_run(columns, mine, scene, end_s).items():
+            coverage = self.coverage(scene, self.flights(group, number))
+            for name, value in self._of_run(columns, mine, coverage, end_s).items():
                 values[name][number] = value
         return values
 
-    def _of_run(self, columns: Any, rows: IntArray, scene: Scene, end_s: float) -> dict[str, float]:
-        coverage = Coverage(scene)
+    def _of_run(
+        self, columns: Any, rows: IntArray, coverage: Coverage, end_s: float
+    ) -> dict[str, float]:
         own, targets = coverage.aircraft
         time_s = np.arange(self.p.from_s, end_s + 1e-9, self.p.step_s)
         values: dict[str, float] = {}

@@ -8,15 +8,14 @@ from pydantic import Field, model_validator
 
 from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import COVARIANCE, full_covariance, held
-from components.metrics.rows import is_named
-from components.metrics.separation import refuse_other_platforms, traffic_of
+from components.metrics.flown_flights import PlatformTracks
+from components.metrics.rows import PlatformParameters, is_named
 from components.metrics.track_scores import ReportedTracks, TrackTally, innovation_results
 from components.metrics.true_states import Coverage, states_in_frame
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.component import Parameters
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import FRACTION, NUMBER, Group, Metric, Result, recorded_by
+from dsa_des.studies.metric import FRACTION, NUMBER, Group, Result, recorded_by
 
 _TABLE = "state_tracks"
 _MOST_STRETCHES = 400
@@ -59,7 +58,7 @@ _RESULTS = {
 }
 
 
-class TrackingParameters(Parameters):
+class TrackingParameters(PlatformParameters):
     """When tracks are compared with the truth, and what belongs together."""
 
     block: str | None = Field(
@@ -94,7 +93,7 @@ class TrackingParameters(Parameters):
         return self
 
 
-class Tracking(Metric):
+class Tracking(PlatformTracks):
     """Compares confirmed tracks that have a range with all targets, instant by instant.
 
     At every instant of the grid the last tracks that each block reported count, gone on at their
@@ -109,13 +108,12 @@ class Tracking(Metric):
             "nis_freedom",
             *STATE, *ORIGIN, *COVARIANCE.values(),
         ),
-        "detections": ("time_s", "target"),
+        "detections": ("block", "time_s", "target"),
     }  # fmt: skip
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        refuse_other_platforms(scene)
-        known, block = recorded_by(scene, _TABLE), self.p.block
+        known, block = self.mine(recorded_by(scene, _TABLE)), self.p.block
         if block is not None and block not in known:
             raise ValueError(f"block: {block!r} tells no tracks{did_you_mean(block, known)}")
         self._ends_s: list[float] = []
@@ -149,13 +147,15 @@ class Tracking(Metric):
         confirmed = held(columns["track_status"])
         replica = np.asarray(columns["replica"])
         for number, scene in enumerate(group.scenes):
-            asked = _is_asked_for(columns["block"], scene, self.p.block)
+            asked = self._is_asked_for(columns["block"], scene)
+            flights = self.flights(group, number)
+            coverage = self.coverage(scene, flights)
             mine = np.flatnonzero((replica == number) & asked)
             tally, names = self._tally(
-                columns, mine, confirmed, scene, float(group.duration_s[number])
+                columns, mine, confirmed, flights[1:], float(group.duration_s[number])
             )
-            first = _first_detections(group.tables["detections"], number)
-            entered = Coverage(scene).entered_s(self.p.step_s, float(group.duration_s[number]))
+            first = _first_detections(group.tables["detections"], number, self.mine)
+            entered = coverage.entered_s(self.p.step_s, float(group.duration_s[number]))
             values = tally.results(names, first, entered, float(group.duration_s[number]))
             values |= innovation_results(*self._innovations(columns, mine[confirmed[mine]]))
             for name, value in values.items():
@@ -164,10 +164,24 @@ class Tracking(Metric):
                 outcome[_at(end, of)][number] = tally.last_nees(end - self.p.series_s, end)
         return outcome
 
+    def _is_asked_for(self, column: Any, scene: Scene) -> Any:
+        """Return which rows are of the block that is asked for, or of those that are last."""
+        names = self.mine(column.names)
+        fed = {
+            source for source, target in scene.graph.edges if source in names and target in names
+        }
+        last = [name for name in names if name not in fed]
+        wanted = last if self.p.block is None else [self.p.block]
+        return np.isin(column.codes, [i for i, name in enumerate(column.names) if name in wanted])
+
     def _tally(
-        self, columns: Any, rows: IntArray, confirmed: BoolArray, scene: Scene, duration_s: float
+        self,
+        columns: Any,
+        rows: IntArray,
+        confirmed: BoolArray,
+        targets: list[Any],
+        duration_s: float,
     ) -> tuple[TrackTally, list[str]]:
-        targets = traffic_of(scene)[0].targets
         tally = TrackTally(self.p.within_m, self.p.order, self.p.step_s)
         grid = np.arange(self.p.step_s, duration_s + 1e-9, self.p.step_s)
         grid = grid[grid >= self.p.from_s]
@@ -219,19 +233,6 @@ def _at(end_s: float, of: str) -> str:
     return f"track_nees.time_s{of}.{end_s:g}"
 
 
-def _is_asked_for(column: Any, scene: Scene, block: str | None) -> Any:
-    """Return which rows are of the block that is asked for, or of those that are last."""
-    names = column.names
-    if block is None:
-        fed = {
-            source for source, target in scene.graph.edges if source in names and target in names
-        }
-        wanted = [i for i, name in enumerate(names) if name not in fed]
-    else:
-        wanted = [i for i, name in enumerate(names) if name == block]
-    return np.isin(column.codes, wanted)
-
-
 def _keys(columns: Any) -> IntArray:
     """Return a number for each row's block and track: trackers number their own."""
     track = np.asarray(columns["track"], dtype=np.int64)
@@ -259,8 +260,10 @@ def _standing(columns: Any, rows: IntArray, grid: FloatArray) -> tuple[IntArray,
     return np.concatenate([none, *instants]), np.concatenate([none, *standing])
 
 
-def _first_detections(columns: Any, replica: int) -> dict[str, float]:
-    mine = np.asarray(columns["replica"]) == replica
+def _first_detections(columns: Any, replica: int, on_board: Any) -> dict[str, float]:
+    names = columns["block"].names
+    aboard = [names.index(name) for name in on_board(names)]
+    mine = (np.asarray(columns["replica"]) == replica) & np.isin(columns["block"].codes, aboard)
     result = {}
     for name in columns["target"].names:
         rows = mine & is_named(columns["target"], name)

@@ -1,7 +1,7 @@
 """Where the aircraft of a run truly are: in the frame of a tracker, and in sensors' coverage."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -80,11 +80,11 @@ class TargetsInFrame:
         return np.concatenate([self.at(time_s), velocity], axis=1)
 
 
-def reaches_of(scene: Scene) -> list[Reach]:
-    """Return where the sensors of a scene look, in the ownship's body axes."""
+def reaches_of(scene: Scene, on: Collection[str] | None = None) -> list[Reach]:
+    """Return where the sensors of a scene, or those `on` a platform, look, in its body axes."""
     result = []
-    for block in scene.blocks.values():
-        if "detections" not in block.cls.outputs:
+    for name, block in scene.blocks.items():
+        if "detections" not in block.cls.outputs or (on is not None and name not in on):
             continue
         context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
         offer = block.cls(block.name, block.parameters, context).offer("detections")
@@ -96,21 +96,25 @@ def reaches_of(scene: Scene) -> list[Reach]:
 class Coverage:
     """Whether targets lie in the field of view and within the range of any sensor.
 
-    Hills and the horizon are not asked, nor are manoeuvres of the ownship: it flies on.
+    Hills and the horizon are not asked, nor are manoeuvres of the ownship: it flies on. Of a
+    platform `flights` are its own and those of all that it may see, and sensors those `on` it.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self._source, self.duration_s = traffic_of(scene)
-        self._reaches = reaches_of(scene)
-
-    @property
-    def aircraft(self) -> tuple[Any, Sequence[Any]]:
-        """The flights of the ownship and of all targets."""
-        return self._source.own, self._source.targets
+    def __init__(
+        self,
+        scene: Scene,
+        flights: Sequence[Any] | None = None,
+        on: Collection[str] | None = None,
+    ) -> None:
+        source, self.duration_s = traffic_of(scene)
+        own, *targets = source.seen_from() if flights is None else flights
+        #: The flights of who looks and of all targets.
+        self.aircraft: tuple[Any, Sequence[Any]] = own, targets
+        self._reaches = reaches_of(scene, on)
 
     def holds(self, target: Any, time_s: FloatArray) -> BoolArray:
         """Return whether a target is covered at times (n,)."""
-        own, other = self._source.own.at(time_s), target.at(time_s)
+        own, other = self.aircraft[0].at(time_s), target.at(time_s)
         ends = [
             np.ascontiguousarray(np.broadcast_to(value, time_s.shape))
             for state in (own, other)
@@ -136,7 +140,7 @@ class Coverage:
         end_s = min(self.duration_s, until_s)
         grid = np.append(np.arange(0.0, end_s, step_s), end_s)
         result = {}
-        for target in self._source.targets:
+        for target in self.aircraft[1]:
             inside = self.holds(target, grid)
             if not inside.any():
                 continue

@@ -3,11 +3,12 @@
 import csv
 import sys
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from components.thesis.rows import Columns, Made, Row, tally
+from components.thesis.rows import DIFFERS, Columns, Made, Row, tally
 from components.thesis.table import ITEMS, Item, chosen
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.files.output_file import check_file, write_file
@@ -178,20 +179,44 @@ def _section(item: Item, made: Made, images: str) -> str:
     extra = (" derived |", " ---: |") if derived else ("", "")
     lines += [f"| quantity | printed |{extra[0]} ours | difference | unit | verdict | from |"]
     lines += [f"| --- | ---: |{extra[1]} ---: | ---: | --- | --- | --- |"]
-    lines += [line(row, derived) for row in made.rows]
+    said = remarks(made.rows)
+    lines += [line(row, derived, said) for row in made.rows]
     lines.append("")
+    if said:
+        lines += ["  \n".join(f"{letter} {text}" for text, letter in said.items()), ""]
     if made.note:
         lines += [made.note, ""]
     for picture in made.pictures:
-        lines += [f"![{picture.caption}]({images}/{picture.name}.png)", "", picture.caption, ""]
+        lines += [f"![{item.title}]({images}/{picture.name}.png)", "", picture.caption, ""]
     return "\n".join(lines)
 
 
-def line(row: Row, derived: bool) -> str:
-    """Return a row as a line of its table, with or without the column of derived numbers."""
+def remarks(rows: Sequence[Row]) -> dict[str, str]:
+    """Return text → letter of what several rows of a table say; it stands once, below the table."""
+    said: Counter[str] = Counter()
+    for row in rows:
+        said.update([*row.sources, *([row.because] if row.verdict == DIFFERS else [])])
+    repeated = [text for text, number in said.items() if number > 1 and len(text.split()) > 2]
+    return {text: f"({_letter(number)})" for number, text in enumerate(repeated)}
+
+
+def _letter(number: int) -> str:
+    before, last = divmod(number, 26)
+    return (_letter(before - 1) if before else "") + chr(ord("a") + last)
+
+
+def line(row: Row, derived: bool, said: Mapping[str, str]) -> str:
+    """Return a row as a line of its table, with or without the column of derived numbers.
+
+    What is among `said` is replaced by its letter.
+    """
     difference = "" if row.difference is None else short(row.difference, sign=True)
+    verdict = row.verdict
+    if verdict == DIFFERS:
+        verdict += f" {said.get(row.because, row.because)}"
+    source = " ".join(said.get(part, part) for part in row.sources)
     cells = (row.quantity, row.printed or "", *((row.derived,) if derived else ()),
-             short(row.ours), difference, row.unit, row.said, row.source)  # fmt: skip
+             short(row.ours), difference, row.unit, verdict, source)  # fmt: skip
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 

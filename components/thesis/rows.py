@@ -117,14 +117,19 @@ class Row:
         return f"{DIFFERS} {self.because}" if self.verdict == DIFFERS else self.verdict
 
     @property
-    def source(self) -> str:
-        """Return in a few words where our number comes from."""
+    def sources(self) -> list[str]:
+        """Return what there is to say of where our number comes from, one thing each."""
         parts = [self.basis.sentence] if self.basis is not None else []
         if self.why:
             parts.append(self.why)
         if self.again:
             parts.append(f"Says again: {self.again}.")
-        return " ".join(parts)
+        return parts
+
+    @property
+    def source(self) -> str:
+        """Return in a few words where our number comes from."""
+        return " ".join(self.sources)
 
     @property
     def predicts(self) -> bool:

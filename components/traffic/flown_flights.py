@@ -18,7 +18,7 @@ from components.flights.fleet import Fleet, in_rows
 from components.flights.many_flights import SteeredFleet
 from components.geometry import TrajectoryState
 from components.messages.steering import Manoeuvre
-from dsa_des.arrays.keyed_table import turns
+from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
@@ -275,63 +275,62 @@ class FlownFlights:
         return published
 
 
-class Coming(NamedTuple):
-    """A manoeuvre that has come, in which run, when, and for which of the platforms."""
+class Coming(KeyedTable):
+    """Manoeuvres that have come: in which run (`replica`), at which `tick`, for which `platform`,
+    and what they are (`manoeuvre`, (fields of `Manoeuvre`, n)).
+    """
 
-    run: int
-    tick: int
-    platform: int
-    manoeuvre: Manoeuvre
+    @classmethod
+    def none(cls) -> Coming:
+        """Return none."""
+        types = {"replica": int, "tick": int, "platform": int, "manoeuvre": float}
+        return cls.empty(types, {"manoeuvre": (len(Manoeuvre._fields),)})
+
+    @property
+    def instants(self) -> RunTicks:
+        """When each came."""
+        return RunTicks(self.replica, self.tick)
 
 
 def arrived_manoeuvres(wake: Wake, steers: Mapping[str, int]) -> list[Coming]:
     """Return the manoeuvres that have come since the last wake; blocks steer which platform."""
     return [
-        Coming(run, tick, steers[new.source], Manoeuvre(*values))
-        for new in wake.arrivals("manoeuvres")
-        for run, tick, *values in zip(
-            new.message.run.tolist(),
-            new.tick.tolist(),
-            *(getattr(new.message, name).tolist() for name in Manoeuvre._fields),
-            strict=True,
+        Coming(
+            replica=np.array(new.message.run),
+            tick=new.tick,
+            platform=np.full(len(new.tick), steers[new.source]),
+            manoeuvre=new.message.manoeuvres().T,
         )
+        for new in wake.arrivals("manoeuvres")
     ]
 
 
-def due_manoeuvres(wake: Wake, pending: list[Coming]) -> tuple[list[Coming], list[Coming]]:
+def due_manoeuvres(wake: Wake, pending: Coming) -> tuple[Coming, Coming]:
     """Part what has come into what rows of this wake fly, and what is for later ones.
 
     What comes after the last row is for the next wake: what is flown at the end of a run must not
     depend on how far a window reached beyond it.
     """
-    pending = sorted(pending, key=lambda one: one[:3])
-    came = _instants(pending)
+    pending = pending.take(np.lexsort((pending.platform, pending.tick, pending.replica)))
+    came = pending.instants
     row = next_of_run(wake.instants, came)  # the first that flies it, if it is of its ownship
     due = (row < len(wake)) & (wake.run[np.minimum(row, len(wake) - 1)] == came.run)
-    now = [one for one, is_due in zip(pending, due.tolist(), strict=True) if is_due]
-    return now, [one for one, is_due in zip(pending, due.tolist(), strict=True) if not is_due]
+    return pending.take(due), pending.take(~due)
 
 
 def steered(
-    own: SteeredFleet, due: list[Coming], wake: Wake, run: IntArray
+    own: SteeredFleet, due: Coming, wake: Wake, run: IntArray
 ) -> tuple[SteeredFleet, IntArray]:
     """Return a platform that flies what has come, and how many manoeuvres each row of runs knows.
 
     A row knows the manoeuvres that have come by its own instant, whatever came later in this wake.
     """
     known: IntArray = own.manoeuvre_count[run]
-    came = _instants(due)
-    for one in turns(came.run):  # the first of every run, then the next
-        ownship, ticks = came.run[one], came.tick[one]
-        manoeuvres = [due[number].manoeuvre for number in one.tolist()]
-        own = own.steered(ownship, ticks / wake.ticks_per_s, manoeuvres)
+    for one in turns(due.replica):  # the first of every run, then the next
+        ownship, ticks = due.replica[one], due.tick[one]
+        own = own.steered(ownship, ticks / wake.ticks_per_s, due.manoeuvre[:, one].T)
         known = known + _at_or_after(run, wake.ticks, ownship, ticks)
     return own, known
-
-
-def _instants(coming: list[Coming]) -> RunTicks:
-    runs, ticks = ([getattr(one, name) for one in coming] for name in ("run", "tick"))
-    return RunTicks(np.array(runs, dtype=np.int64), np.array(ticks, dtype=np.int64))
 
 
 def _at_or_after(run: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray) -> IntArray:

@@ -118,6 +118,22 @@ class TrafficSource(Component):
         """Return the names of all aircraft, the ownship's first."""
         return self.roster.own_name, *self.roster.names
 
+    def seen_from(self, platform: str = "") -> list[Any]:
+        """Return the flights, as known now, of a platform (by default the ownship) and then of all
+        that it may see, each by its `name`.
+        """
+        viewer = self._index(platform)
+        others = {
+            place: flight
+            for place, flight in enumerate(self.targets)
+            if place != viewer and place not in self.unseen
+        }
+        if viewer < 0:
+            return [self.own, *others.values()]
+        own = copy(self.own)
+        own.name = self.roster.own_name
+        return [self.targets[viewer], *(of for _, of in sorted({**others, viewer: own}.items()))]
+
     def offer(self, port: str) -> KnownTraffic:
         """Say what the targets are, and where they can be; to all blocks the same.
 
@@ -188,7 +204,7 @@ class TrafficSource(Component):
         rates = [p.update_rate_hz for p in parameters]
         rates_hz = None if None in rates else np.array(rates, dtype=np.float64)
         #: Manoeuvres that have come, and are not flown by any row yet.
-        self._pending: list[Coming] = []
+        self._pending = Coming.none()
         #: The targets that were moved last, and their fleet.
         self._moved: tuple[IntArray, Fleet] = np.arange(len(roster)), flights.targets
         culls = not self.context.simulate_everything and self.clock_of(self.p) is None
@@ -302,28 +318,24 @@ class TrafficSource(Component):
 
     def _steer(self, wake: Wake, run: IntArray) -> IntArray:
         """Let platforms fly what has come; return how many manoeuvres of each every row knows."""
-        self._pending += arrived_manoeuvres(wake, self._steers)
-        if not self._pending:
+        self._pending = Coming.joined([self._pending, *arrived_manoeuvres(wake, self._steers)])
+        if not len(self._pending):
             counts = [fleet.manoeuvre_count[run] for fleet in self._flown.platforms.values()]
             return np.array(counts).T
         due, self._pending = due_manoeuvres(wake, self._pending)
         platforms, known = dict(self._flown.platforms), []
         for platform, fleet in platforms.items():
-            mine = [one for one in due if one.platform == platform]
+            mine = due.take(due.platform == platform)
             if platform >= 0:  # who is not there is not steered
-                there_s = fleet.nominal.intervals_present_s
-                seconds = [one.tick / wake.ticks_per_s for one in mine]
-                mine = [
-                    one
-                    for one, time_s in zip(mine, seconds, strict=True)
-                    if there_s[one.run, 0] <= time_s <= there_s[one.run, 1]
-                ]
+                from_s, until_s = fleet.nominal.intervals_present_s[mine.replica].T
+                time_s = mine.tick / wake.ticks_per_s
+                mine = mine.take((from_s <= time_s) & (time_s <= until_s))
             platforms[platform], count = steered(fleet, mine, wake, run)
             known.append(count)
             for view in self._views:
                 if view.viewer == platform and view.epochs is not None:
-                    for one in mine:
-                        view.epochs.forget(one.run, one.tick / wake.ticks_per_s)
+                    for run_of, tick in zip(mine.replica.tolist(), mine.tick.tolist(), strict=True):
+                        view.epochs.forget(run_of, tick / wake.ticks_per_s)
         self._flown = replace(self._flown, platforms=platforms)
         assert isinstance(self.own, SteeredFlight)
         self.own = SteeredFlight(self.own.flight, self._flown.own)

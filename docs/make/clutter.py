@@ -15,6 +15,7 @@ from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.rain import rain_reflectivity_per_m, rain_volume_m3
 from components.thesis.drawing import GREY, legend_below, panels
 from components.thesis.drawing import RADAR as RADAR_COLOUR
+from docs.make.stamp import stamped
 from dsa_des.block.mark import BLUE, PINK
 from dsa_des.files.output_file import write_file
 from dsa_des.library.runs import run
@@ -290,7 +291,8 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("page", type=Path)
     target = parser.parse_args(arguments).page
-    write_file(target, page(target.parent / "images").encode())
+    text = page(target.parent / "images")
+    write_file(target, stamped(text, "python -m docs.make.clutter docs/clutter.md").encode())
     return 0
 
 

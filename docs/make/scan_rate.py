@@ -19,6 +19,7 @@ from docs.make.declaration_ranges import (
     mean_range_m,
     ranges_of_declaration,
 )
+from docs.make.stamp import stamped
 from dsa_des.block.mark import BLUE, PINK
 from dsa_des.files.output_file import write_file
 from dsa_des.library.study import StudyResult, study
@@ -260,7 +261,8 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("page", type=Path)
     target = parser.parse_args(arguments).page
-    write_file(target, page(target.parent / "images").encode())
+    text = page(target.parent / "images")
+    write_file(target, stamped(text, "python -m docs.make.scan_rate docs/scan-rate.md").encode())
     return 0
 
 

@@ -27,6 +27,9 @@ class Input:
         trigger input with a single writer holds a first message.
     many : bool
         Whether several writers may be connected; they are seen in the order of their names.
+    between_platforms : bool
+        Whether writers may be on other platforms than the block: what they send speaks for itself,
+        and does not say what carries it.
     """
 
     message: type[Message]
@@ -34,6 +37,7 @@ class Input:
     doc: str = ""
     required: bool = True
     many: bool = False
+    between_platforms: bool = False
 
     @property
     def held(self) -> bool:

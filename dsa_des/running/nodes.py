@@ -122,7 +122,10 @@ def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None
 
 
 def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
-    """Return the first clocked blocks on every way downstream, and the delay on the way."""
+    """Return the first clocked blocks on every way downstream, and the delay on the way.
+
+    What comes back to it around a loop asks nothing new of it: each turn would, one delay earlier.
+    """
     demands: dict[tuple[str, int], Demand] = {}
     seen = {(name, 0)}
     todo = [(name, 0)]
@@ -134,7 +137,7 @@ def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
             reached = (node.name, lead + channel.delay_ticks)
             if node.clock is not None:
                 demands[reached] = Demand(node.name, node.clock, reached[1])
-            elif reached not in seen and len(seen) < 1000:
+            elif node.name != name and reached not in seen and len(seen) < 1000:
                 seen.add(reached)
                 todo.append(reached)
     return [demands[key] for key in sorted(demands)]

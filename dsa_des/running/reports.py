@@ -40,6 +40,7 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
         for text in attempt(f"blocks.{name}: warnings", notes, component.warnings) or ():
             notes.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
         notes += [f"blocks.{name}: {text}" for text in _vain_times(simulation, name)]
+    notes += _in_vain(simulation)
     for text in _of_stretches(simulation, notes):
         notes.append(text)
     return _unacknowledged(scene, [*notes, *_slowed(simulation)])
@@ -66,6 +67,31 @@ def _of_stretches(simulation: Simulation, said: list[str]) -> Iterator[str]:
             f"{float(scene.stretches[number - 1].from_s):g} s they say otherwise: "
             f"{scene.classes[name].path()} does not say what it remembers"
         )
+
+
+def _in_vain(simulation: Simulation) -> Iterator[str]:
+    """Say which blocks do again what another one does, or send to nobody what nothing records."""
+    scene, graph = simulation.scene, simulation.scene.graph
+    first: list[str] = []
+    for name, component in simulation.components.items():
+        sources = [*graph.predecessors(name)]
+        if component.outputs and not graph.out_degree(name):
+            if not any(message.recorded for message in component.records()):
+                yield f"blocks.{name}: what it sends goes nowhere: no wire begins at it"
+        elif sources and all(simulation.components[of].platforms() for of in sources):
+            mine = scene.blocks[name]
+            for of in first:
+                other, on = scene.blocks[of], component.context.platform
+                if (mine.cls, mine.parameters) == (other.cls, other.parameters) and (
+                    on == simulation.components[of].context.platform
+                    and sources == [*graph.predecessors(of)]
+                ):
+                    yield (
+                        f"blocks.{name}: is as {of}, and both are on {on!r}: platform = NAME puts "
+                        "it, and what it feeds, on another aircraft"
+                    )
+                    break
+            first.append(name)
 
 
 def _vain_times(simulation: Simulation, name: str) -> Iterator[str]:

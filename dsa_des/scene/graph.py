@@ -6,6 +6,7 @@ the order in the file.)
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence, Set
+from pathlib import Path
 
 import networkx as nx
 
@@ -54,8 +55,10 @@ def check_graph(
         for port in ports:
             declared = classes[name].inputs[port]
             message = f"input {port!r} ({declared.message.__name__}) is required and has no wire"
-            if scene.source_of(("blocks", name)) != scene.source_of(("wires",)):
-                message += f'; wire it, or leave the block out: blocks.remove = ["{name}"]'
+            if scene.source_of(("blocks", name)) != (wiring := scene.source_of(("wires",))):
+                message += f"; the wires of {Path(wiring).name} take the place of those that it "
+                message += "extends: repeat them there, or leave the block out: "
+                message += f'blocks.remove = ["{name}"]'
             scene.report(("blocks", name), message)
     _check_cycles(scene, graph)
     if known == set(classes) and not unsure:

@@ -17,7 +17,11 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
     carrying: dict[str, str] = {}
     problems: list[Problem] = []
     for name, block in scene.blocks.items():
-        feeding = [wire.source for wire in scene.wires if wire.target == name]
+        feeding = [
+            wire.source
+            for wire in scene.wires
+            if wire.target == name and not block.cls.inputs[wire.input].between_platforms
+        ]
         said = block.options.platform
         if said is not None and (said not in known or name in moved):
             problems.append(_no_platform(scene, name, known if name not in moved else None))
@@ -38,9 +42,12 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
         mine, feeders = carrying[name], _feeding(scene, name, carrying)
         for other in sorted(feeders.keys() - {mine}):
             by = f"{feeders[mine]} feeds it" if mine in feeders else "its key platform says"
+            how = "give each platform one of its own"
+            if mine not in feeders:
+                how += ", and say which at the first block of its chain"
             message = (
                 f"is carried by {mine!r}, as {by}, and {feeders[other]} on {other!r} feeds it too: "
-                "a block looks from one place; give each platform one of its own"
+                f"a block looks from one place; {how}"
             )
             problems.append(scene.problem(f"blocks.{name}", message))
     if problems:
@@ -51,8 +58,10 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
 def _feeding(scene: Scene, name: str, carrying: Mapping[str, str]) -> dict[str, str]:
     """Return what carries the blocks that feed one, with the first of these on each."""
     found: dict[str, str] = {}
+    inputs = scene.blocks[name].cls.inputs
     for wire in scene.wires:
-        if wire.target == name and wire.source in carrying:
+        between = wire.target == name and inputs[wire.input].between_platforms
+        if wire.target == name and wire.source in carrying and not between:
             found.setdefault(carrying[wire.source], wire.source)
     return found
 

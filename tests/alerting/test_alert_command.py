@@ -1,5 +1,6 @@
 """``dsa-des alert``: tables, figures, and errors that leave nothing behind."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -62,13 +63,16 @@ def test_the_levels_are_those_of_the_volumes(tmp_path: Path) -> None:
     """Level 2 is a cylinder of 2000 ft: entered at (2.5 nmi - root) / 80 m/s; due 25 s before."""
     out = tmp_path / "alerts.csv"
     path = head_on(tmp_path / "a.xyz", 40)
-    assert call(path, "--conf", conf(tmp_path), "--out", out, "--no-hysteresis").exit_code == 0
+    said = call(path, "--conf", conf(tmp_path), "--out", out, "--no-hysteresis")
+    assert said.exit_code == 0
     found = rows(out.read_text(encoding="utf-8"))[2:]
     entry_s = (2.5 * 1852 - ((2000 * 0.3048) ** 2 - 185.2**2) ** 0.5) / 80
     for row in found:
         left_s = entry_s - float(row[0])
         assert float(row[6]) == pytest.approx(left_s, abs=2e-6)
         assert row[4] == ("2" if left_s < 25 else "1")
+    # Entered at 50.6 s; what is printed are the first instants of each level.
+    assert re.search(r"a\.xyz\W+big bird\W+2\W+0\.0\W+26\.0\W", said.stdout), said.stdout
 
 
 def test_several_encounters_fill_a_folder(tmp_path: Path) -> None:

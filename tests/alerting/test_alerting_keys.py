@@ -3,6 +3,7 @@
 import math
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import crooked
@@ -228,3 +229,11 @@ def test_a_bad_configuration_is_named(tmp_path):
     path.write_text(CONF.format(m=0).replace("= 500 [m]", "= 500"), encoding="utf-8")
     with pytest.raises(SceneError, match="small_d_WCV_DTHR has no unit"):
         run(bad)
+
+
+def test_alerts_are_offered_with_their_levels_and_scan_time():
+    parameters = SimpleNamespace(
+        read=lambda: (None, SimpleNamespace(levels=[1, 2, 3])), scan_rate_hz=Fraction(5, 2)
+    )
+    offered = DaidalusAlerting.offer(SimpleNamespace(p=parameters), "alerts")
+    assert (offered.levels, offered.period_s) == (3, 0.4)

@@ -58,6 +58,17 @@ def test_the_alerting_of_a_pair_sees_the_tracks_of_the_same_chain():
     assert tables["alerts"].num_rows > 100
 
 
+def test_with_both_equipped_the_first_chain_is_as_alone_and_the_second_sees_the_ownship():
+    both, plain = FORMS["both_equipped"]
+    assert len(both.blocks) == 2 * len(plain.blocks) - 1
+    (_, tables), (_, same) = run(both), run(plain)
+    rows = tables["fused"].to_pylist()
+    mine = [row for row in rows if row["block"] == "fusion"]
+    assert [{**row, "platform": "ownship"} for row in same["fused"].to_pylist()] == mine
+    theirs = {row["target"] for row in rows if row["block"] == "fusion_b"}
+    assert "ownship" in theirs and "head_on" not in theirs
+
+
 @pytest.mark.parametrize("rate", RATES, ids=lambda rate: rate.name)
 def test_a_rate_is_measured(rate, monkeypatch):
     fewer = tuple(

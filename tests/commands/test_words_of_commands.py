@@ -1,6 +1,7 @@
 """Options that commands share, further commands, completion, and one line for each slip."""
 
 import json
+import signal
 from pathlib import Path
 
 import pytest
@@ -251,3 +252,11 @@ def test_a_mistake_in_ones_own_block_names_file_line_and_function(own, command, 
 def test_a_type_without_a_ladder_is_named(own):
     done = call("cost", "first_light", "--swap", f"radar={own}:Honest", "--block", "radar")
     assert f"error: radar: {own}:Honest declares no ladder" in done.stderr
+
+
+def test_nothing_is_interrupted_after_a_deadline_that_was_met():
+    before = signal.getsignal(signal.SIGALRM)
+    with grouping._deadline(60.0):
+        assert 0.0 < signal.getitimer(signal.ITIMER_REAL)[0] <= 60.0
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    assert signal.getsignal(signal.SIGALRM) is before

@@ -88,7 +88,7 @@ def test_who_never_comes_near_a_target_is_false():
         "own_east_m": np.full(len(rows), 4.0),
     }
     for pieces in (1, len(rows)):
-        summary = TrackSummary(["t", "u"], lambda origin: Still())
+        summary = TrackSummary(["t", "u"], lambda tracker, origin: Still())
         for part in np.array_split(np.arange(len(rows)), pieces):
             some = {
                 name: Text(of.codes[part], of.names) if isinstance(of, Text) else of[part]
@@ -118,7 +118,7 @@ def test_who_never_comes_near_a_target_is_false():
 
 
 def test_a_track_of_directions_alone_is_confirmed_at_no_range():
-    summary = TrackSummary(["t"], lambda origin: Still())
+    summary = TrackSummary(["t"], lambda tracker, origin: Still())
     blank = {name: np.full(1, np.nan) for name in ("north_m", "east_m", "down_m")}
     summary.update("state_tracks", {
         "block": text(["t"], ("t",)), "track": np.array([7]), "has_range": np.array([False]),

@@ -104,6 +104,7 @@ def test_scans_are_found_as_by_looking_at_all(tmp_path_factory, rows, start_s, l
     block = np.array([name for name, _ in rows])
     columns = {"block": block.tolist(), "time_s": time_s, "detected": hit.astype(np.int64)}
     write(folder, "scans", columns, group)
+    write(folder, "detections", columns | {"time_s": time_s + 0.25})  # another table of the run
     scans = read_scans(folder)
     shown = scans_between(folder, start_s, start_s + length_s, scans)
     assert list(scans) == list(shown) == sorted(set(block.tolist()))

@@ -18,6 +18,7 @@ from components.display.symbols import (
     evenly,
     staggered,
     styles_of,
+    targets_key,
 )
 from components.fusion.gated import Gated
 from components.optical.sensors import ElectroOptical, Infrared, Projection
@@ -208,3 +209,10 @@ def test_the_ownship_s_line_is_drawn_over_those_of_targets_if_there_is_one(targe
     )
     draw_lines(axes, lines)
     assert [len(one.get_segments()) for one in axes.collections[1:]] == [targets] * (targets > 0)
+
+
+def test_the_key_of_targets_says_what_is_dense():
+    dense, thin = targets_key(True), targets_key(False)
+    assert (dense.get_label(), dense.get_linewidth()) == ("targets (darker: more)", 5.0)
+    assert (thin.get_label(), thin.get_linewidth()) == ("target", 1.0)
+    assert dense.get_color() == thin.get_color() == TARGET

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from components.flights.geodesic_motion import _distance_series, _longitude_series
 from components.flights.point_mass import FT_S_PER_KT, fly_euler, fly_point_mass, summed
 
 
@@ -131,3 +132,27 @@ def test_sums_begin_at_the_start_and_take_each_rate_once(count):
     np.testing.assert_array_equal(summed(start, rates), expected)
     np.testing.assert_array_equal(summed(start, rates[:2]), expected[:2])
     np.testing.assert_array_equal(summed(start, rates[:1]), expected[:1])
+
+
+@pytest.mark.parametrize(("eps", "n"), [(0.03, 0.02), (0.02, -0.03), (-0.025, 0.03)])
+def test_the_series_of_a_geodesic_are_those_of_its_integrals(eps, n):
+    """Karney (2013), eqs 7 and 8: their means and harmonics, by the trapezoidal rule."""
+    sigma = np.pi * np.arange(64) / 64
+    stretch = np.sqrt(1.0 + 4.0 * eps / (1.0 - eps) ** 2 * np.sin(sigma) ** 2)
+    flattening = 2.0 * n / (1.0 + n)
+    longitude = (2.0 - flattening) / (1.0 + (1.0 - flattening) * stretch)
+
+    def harmonics(rate, count):
+        waves = np.cos(2.0 * np.outer(np.arange(1, count + 1), sigma))
+        return (rate / rate.mean() * waves).mean(axis=1) / np.arange(1, count + 1)
+
+    a1, c1, inverse = _distance_series(eps)
+    assert a1 == pytest.approx(stretch.mean(), abs=1e-9)
+    np.testing.assert_allclose(c1, harmonics(stretch, len(c1)), rtol=1e-3)
+    np.testing.assert_allclose(c1[:4], harmonics(stretch, 4), rtol=2e-6)
+    along = sigma + np.sin(2.0 * np.outer(sigma, np.arange(1, len(c1) + 1))) @ np.array(c1)
+    back = along + np.sin(2.0 * np.outer(along, np.arange(1, len(c1) + 1))) @ np.array(inverse)
+    np.testing.assert_allclose(back, sigma, atol=3e-9)
+    a3, c3 = _longitude_series(eps, n)
+    assert a3 == pytest.approx(longitude.mean(), abs=3e-9)
+    np.testing.assert_allclose(c3, harmonics(longitude, len(c3)), atol=3e-9)

@@ -108,6 +108,8 @@ def level(name, alt=1000, step=0.0005, lat=52.0, count=21, dt=1):
         (level("b", 1200, lat=52.01), None, None),
         (level("b", 35_000, lat=52.01), None, "b: it flies at 35,000 m; are altitudes in feet"),
         (level("b", 1200, 0.05, 52.01), None, "m/s; are positions in degrees read as radians"),
+        # 0.02 degrees a second of a parallel of 3,935 km: 1,374 m/s.
+        (level("b", 1200, 0.02, 52.01), None, "b: its positions imply 1,374 m/s"),
         (
             [(t, "b", 52.01, 4 + t * 0.0005 + (0.002 if t == 9 else 0), 1000) for t in range(21)],
             None,

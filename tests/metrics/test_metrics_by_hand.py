@@ -1,5 +1,6 @@
 """Metrics on tables small enough to work out by hand, and on real runs one by one."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from components.metrics.losses import closest, first_inside, first_losses_s, nearest_of, ways_of
-from components.metrics.separation import Separation, separations
+from components.metrics.separation import Separation, distances_m, separations
 from components.well_clear.volume import PRESETS
 from dsa_des.block.entry_points import registered
 from dsa_des.block.message import Text
@@ -222,3 +223,18 @@ def test_an_old_detection_that_comes_late_makes_nothing_older(small: Path) -> No
     found = metric.measure(Group(scene, [Replica(1)], recorded, wanted_by([metric])))
     assert found["age_of_information_mean_s"] == pytest.approx([0.25])
     assert found["age_of_information_p95_s"] == pytest.approx([0.475])
+
+
+def test_distances_are_there_only_where_both_are():
+    there = np.array([[True, True, False, False], [True, False, True, False]])
+    own, other = (
+        SimpleNamespace(lat_deg=np.full(4, 0.0), lon_deg=np.full(4, east), alt_m=np.full(4, up),
+                        present=present)
+        for east, up, present in zip((0.0, 1e-3), (400.0, 100.0), there, strict=True)
+    )  # fmt: skip
+    slant, level, height = distances_m(own, other)
+    # On the equator, a thousandth of a degree of a circle of 6,378,137 m and some 250 m.
+    chord = (6378137.0 + 250.0) * math.radians(1e-3)
+    for found, wanted in ((slant, math.hypot(chord, 300.0)), (level, chord), (height, 300.0)):
+        assert found[0] == pytest.approx(wanted, rel=1e-4)
+        assert found[1:].tolist() == [math.inf] * 3

@@ -99,12 +99,28 @@ def test_a_pair_is_as_far_apart_for_the_one_as_for_the_other(scene):
     assert abs(own["slowc_percent"] - ours["slowc_percent"]) > 1.0
 
 
-@pytest.mark.parametrize("metric", ["tracking", "track_errors_by_range"])
-def test_tracks_of_other_platforms_are_not_measured_by_the_ownship(metric):
-    filtered = {"type": "tracking.ekf", "acceleration_intensity_m2_s3": 0.2}
-    how = {"tracker": filtered, "duration_s": 10}
-    with pytest.raises(dsa_des.SceneError, match="those of other platforms not yet"):
-        measured(scene_of(OWN, [B], BOTH, **how), {"metric": metric})
+@covers("platform", of=("[metric tracking]", "[metric track_errors_by_range]"))
+def test_tracks_of_each_are_measured_by_what_it_sees_as_all_flew():
+    """A radar of small errors: tracks are tens of metres wrong; flights as planned, hundreds."""
+    fine = SURE_RADAR | {"azimuth_resolution_deg": 0.2, "elevation_resolution_deg": 0.2,
+                         "range_resolution_m": 20}  # fmt: skip
+    how = {"radar": fine, "duration_s": 90,
+           "tracker": {"type": "tracking.ekf", "acceleration_intensity_m2_s3": 9}}  # fmt: skip
+    flown = scene_of(OWN, [B | {"east_m": 4200, "north_m": 4000}], BOTH, **how)
+    assert len({*tables_of(flown)[1]["manoeuvres"]["block"].to_pylist()}) == 2
+    for platform, tracker in (("ownship", "tracker"), ("b", "tracker_b")):
+        by_range = {"metric": "track_errors_by_range", "ranges_nmi": [1.5, 2], "from_s": 1}
+        found = measured(
+            flown, {"metric": "tracking", "platform": platform},
+            {"metric": "tracking", "platform": platform, "block": tracker},
+            {**by_range, "platform": platform},
+        )  # fmt: skip
+        assert found["track_position_error_m"] == found[f"track_position_error_m.{tracker}"] < 80.0
+        assert found["track_completeness"] > 0.8 and found["track_spuriousness"] == 0.0
+        assert found["track_confirmation_from_coverage_s"] >= 0.0
+        assert 1.5 < found["first_track_range_nmi"] < 3.5
+    with pytest.raises(dsa_des.SceneError, match="'tracker' tells no tracks"):
+        measured(flown, {"metric": "tracking", "platform": "b", "block": "tracker"})
 
 
 def test_a_platform_that_there_is_not_is_said(scene):

@@ -9,6 +9,7 @@ from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 
 import dsa_des
 from dsa_des import SceneError
+from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 OWN = {"lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 1000, "heading_deg": 0, "speed_mps": 50}
@@ -168,7 +169,9 @@ MISTAKES = {
     "a block's own word against its chain": (
         {"": None},
         {"tracker": "b"},
-        "blocks.tracker: is carried by 'b', as its key platform says, and fusion on 'ownship'",
+        "blocks.tracker: is carried by 'b', as its key platform says, and fusion on 'ownship' "
+        "feeds it too: a block looks from one place; give each platform one of its own, and say "
+        "which at the first block of its chain",
     ),
 }
 
@@ -235,3 +238,28 @@ def test_tables_say_on_which_platform_a_block_is_where_there_are_several():
         assert rows == ({("traffic", None)} if kind == "traffic" else on)
     alone = tables_of(scene_of(OWN, [B], {"_b": "b"}, duration_s=5))[1]
     assert not any("platform" in table.column_names for table in alone.values())
+
+
+def test_a_platform_that_was_forgotten_and_a_chain_that_ends_in_nothing_are_noted():
+    chain = " -> ".join(("traffic", "transform_b", "gate_b", "radar_b", "fusion_b"))
+    tables = scene_of(OWN, [B], {"": None}, duration_s=5).resolved()
+    blocks = {name: of for name, of in blocks_of("_b", None).items() if f"{name} ->" in chain}
+    tables["blocks"] |= blocks | {"fusion_b": {"type": "fusion.pass_through"}}
+    wires = tables["wires"]
+
+    def noted(**platform):
+        tables["blocks"]["transform_b"] = {"type": "geometry.ellipsoid", **platform}
+        notes = notes_of_scene(Simulation(dsa_des.load_scene(tables)))
+        return [note for note in notes if "_b: " in note]
+
+    tables["wires"] = [*wires, chain]
+    assert noted(platform="b") == []
+    (note,) = noted()
+    assert note == (
+        "blocks.transform_b: is as transform, and both are on 'ownship': platform = NAME puts it, "
+        "and what it feeds, on another aircraft"
+    )
+    tables["wires"] = [*wires, "traffic -> transform_b -> gate_b", "gate -> radar_b -> fusion_b"]
+    assert noted(platform="b") == [
+        "blocks.gate_b: what it sends goes nowhere: no wire begins at it"
+    ]

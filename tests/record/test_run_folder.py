@@ -10,7 +10,7 @@ import pytest
 
 import dsa_des
 from dsa_des.files.output_folder import RUN_JSON, OutputFolder, foreign_in
-from dsa_des.record.run_folder import read_run, write_json, write_run_json
+from dsa_des.record.run_folder import _rows_of, read_run, write_json, write_run_json
 
 
 def fill(folder, rows=3):
@@ -107,3 +107,18 @@ def test_a_link_named_run_json_makes_nothing_ours(tmp_path):
     other.mkdir()
     (other / RUN_JSON).symlink_to(tmp_path / "run" / RUN_JSON)
     assert foreign_in(other) == [RUN_JSON]
+
+
+@pytest.mark.parametrize("is_dictionary", [False, True])
+def test_rows_of_another_table_are_found_by_block_tick_and_replica(is_dictionary):
+    def table(keys):
+        replica, tick, block = zip(*keys, strict=True)
+        block = pa.array(block)
+        block = block.dictionary_encode() if is_dictionary else block
+        return pa.table({"replica": replica, "tick": tick, "block": block})
+
+    mine = [(r, t, b) for b in "cab" for t in (9, 0, 4, 7) for r in (0, 2, 1)]
+    theirs = [(r, t, b) for r in (1, 0) for b in "bdc" for t in (4, 9, 8)]
+    wanted = [theirs.index(key) if key in theirs else -1 for key in mine]
+    assert _rows_of(table(mine), table(theirs)).tolist() == wanted
+    assert _rows_of(table(mine), table(theirs).slice(0, 0)).tolist() == [-1] * len(mine)

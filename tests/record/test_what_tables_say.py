@@ -4,10 +4,12 @@ import hashlib
 import json
 
 import pyarrow.parquet as pq
+from matplotlib.figure import Figure
 
 import dsa_des
 from docs.make.reference.__main__ import recorded_tables
 from dsa_des.block.recorded_columns import LEADING
+from dsa_des.record.drawing import _make_plain
 
 QUICK = {"sets": ["record.looks=true"], "duration_s": 6, "seed": 11}
 
@@ -46,3 +48,17 @@ def test_tables_in_memory_say_the_same(tmp_path):
     dsa_des.run(scene, out=tmp_path / "r")
     for name, table in dsa_des.run(scene).tables.items():
         assert table.schema.equals(pq.read_schema(tmp_path / "r" / f"{name}.parquet"), True), name
+
+
+def test_long_and_hostile_words_are_cut_wherever_they_stand_in_a_figure():
+    figure = Figure()
+    axes = figure.add_subplot()
+    axes.set_title("\x1b[2J" + "long " * 90 + "$x^2$")
+    axes.set_xlabel("two\nlines")
+    axes.set_ylabel("plain")
+    axes.text(0.5, 0.5, "\n".join("many"))
+    _make_plain(figure)
+    shown = axes.get_title()
+    assert len(shown) <= 200 + len(r"\x1b") and "\x1b" not in shown and "$x" not in shown[:100]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("two\nlines", "plain")
+    assert not axes.title.get_parse_math()

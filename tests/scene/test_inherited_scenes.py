@@ -200,7 +200,8 @@ def test_a_block_of_the_base_without_a_wire_is_said_once_and_how_to_leave_it_out
         load_scene(path)
     assert [str(problem) for problem in refused.value.problems] == [
         f"{tmp_path / 'base.toml'}: blocks.radar: input 'targets' (RelativeTargets) is required "
-        'and has no wire; wire it, or leave the block out: blocks.remove = ["radar"]'
+        "and has no wire; the wires of scene.toml take the place of those that it extends: repeat "
+        'them there, or leave the block out: blocks.remove = ["radar"]'
     ]
     assert set(load_scene(write('blocks.remove = ["radar"]')).blocks) == {"traffic", "transform"}
 

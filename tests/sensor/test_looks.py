@@ -1,5 +1,7 @@
 """The table ``looks``: what was looked at and not detected stands there too."""
 
+from types import SimpleNamespace
+
 import crooked
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from covering import covers
 from wired import HEARS_ALL, SEES_ALL, chain, rows, run, sensor
 
 import dsa_des
+from components.sensor.declaration import DeclarationByPlace, DeclarationRule
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -109,3 +112,22 @@ def test_a_value_of_neither_kind_is_one_problem():
     scene = chain({"radar": HEARS_ALL}, record={"truth": "maybe"})
     with pytest.raises(dsa_des.SceneError, match=r"'maybe': must be true or false or 'auto'$"):
         dsa_des.load_scene(scene)
+
+
+@pytest.mark.parametrize(
+    ("m", "by", "asked", "place", "target"),
+    [
+        (None, "place", None, "declare_m and declare_n are not given", None),
+        (2, "place", None, "the sensor has false alarms", "places are declared"),
+        (2, "target", None, "without false alarms all", "declare_m is 2 and declare_n is 3"),
+        (2, "target", "target", "declare_by is 'target'", "declare_m is 2 and declare_n is 3"),
+    ],
+)
+def test_what_declares_says_why(m, by, asked, place, target):
+    p = SimpleNamespace(declare_m=m, declare_n=3, declares_by=by, declare_by=asked)
+    for effect, wanted, applies in (
+        (DeclarationByPlace, place, m is not None and by == "place"),
+        (DeclarationRule, target or place, m is not None and by == "target"),
+    ):
+        said = effect().verdict(SimpleNamespace(p=p))
+        assert said.simulated is applies and wanted in said.because

@@ -2,12 +2,14 @@
 
 import math
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pymap3d
 import pytest
 from scipy.ndimage import map_coordinates
 
+from components.flights.bounds import _place, check_above_terrain, check_on_raster
 from components.terrain.raster import ElevationRaster, mosaic, read_raster
 from components.terrain.rays import (
     behind_terrain,
@@ -322,3 +324,43 @@ def test_a_raster_too_large_is_refused_before_it_is_read(tmp_path, ending):
     said = r"terrain.raster = .*S42W180.*by.*nodes: at most 100,000,000 are held; cut it"
     with pytest.raises(SceneError, match=said):
         dsa_des.load_scene("terrain/behind_the_ridge", sets=[f"terrain.raster={raster}"])
+
+
+def test_a_flight_is_held_against_the_ground_where_it_is_there():
+    """Absent for two seconds, then 100 m a second lower, from 0.5 degrees on over the raster."""
+    seconds = np.arange(6.0)
+    state = SimpleNamespace(
+        lat_deg=0.1 + 0.2 * seconds, lon_deg=7.0 + 0.01 * seconds, alt_m=900.0 - 100.0 * seconds,
+        present=seconds >= 2.0,
+    )  # fmt: skip
+
+    def ground(first_deg):
+        return SimpleNamespace(
+            name="g.tif", box=lambda: "some", height=lambda lat, _: (0.0 * lat, lat > first_deg)
+        )
+
+    def at(times):
+        assert times.tolist() == seconds.tolist()
+        return state
+
+    check_on_raster(at, ground(0.6), 399.0, 5.0)
+    with pytest.raises(ValueError, match=r"latitude 0\.5, longitude 7\.02 and never over it"):
+        check_on_raster(at, ground(9.0), 0.0, 5.0)
+    with pytest.raises(ValueError, match=r"is 600 m high under .* at 600 m at 3 s"):
+        check_on_raster(at, ground(0.6), 600.0, 5.0)
+    with pytest.raises(ValueError, match=r"height_m is 700: .* at 700 m at 2 s"):
+        check_above_terrain(at, 700.0, 5.0)
+
+
+def test_an_ownship_that_moves_between_samples_turns_by_the_shortest_radius():
+    """A degree at the equator along a meridian is a (1 - e²) radians, 110,574.3 m."""
+    state = SimpleNamespace(lat_deg=np.array([10.0, 12.0]), alt_m=np.array([3.0e4, 2.0e4]))
+    moves_m = (6378137.0 * (1.0 - 0.00669437999014) + 1.0e4) * math.radians(1.0)
+    # It may be that much lower, too: the normal turns a little faster there.
+    ratio = moves_m / (6378137.0 * (1.0 - 0.00669437999014) + 2.0e4 - moves_m)
+    latitudes, heights, turns = _place(state, moves_m)
+    assert turns == pytest.approx(ratio, rel=1e-12)
+    assert latitudes == pytest.approx((10.0 - math.degrees(ratio), 12.0 + math.degrees(ratio)))
+    assert heights == pytest.approx((2.0e4 - moves_m, 3.0e4 + moves_m))
+    near = SimpleNamespace(lat_deg=np.array([-89.5, 89.5]), alt_m=np.zeros(2))
+    assert _place(near, moves_m)[0] == (-90.0, 90.0)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from components.thesis.reproduce import line, short
+from components.thesis.reproduce import line, remarks, short
 from components.thesis.rows import Made, Row, predicted
 from components.thesis.table import ITEMS, Item, chosen
 from dsa_des.cli import main
@@ -136,10 +136,12 @@ def test_page_holds_every_row_with_its_verdict(results):
     """docs/thesis.md is what the command writes; times of a run are not compared."""
     page = (ROOT / "docs" / "thesis.md").read_text(encoding="utf-8")
     for made in results.values():
+        said = remarks(made.rows)
+        assert all(f"{letter} {text}" in page for text, letter in said.items())
         for row in made.rows:
             if row.unit in ("s", "1/s"):
                 continue
-            known = line(row, any(one.derived for one in made.rows))
+            known = line(row, any(one.derived for one in made.rows), said)
             # The last bits of errors near 0 are the machine's.
             assert (known if abs(row.ours) > 1e-6 else f"| {row.quantity} |") in page
         for picture in made.pictures:

@@ -1,8 +1,11 @@
 """What a sensor promises decides what counts as missed, and how long a track lives."""
 
 import math
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import pymap3d
 import pytest
 from wired import chain, rows, run
 
@@ -10,6 +13,7 @@ import dsa_des
 from components.messages.detections import promises_of_looks
 from components.surveillance.reception import certain, do_365, time_to_receive_s
 from components.tracking.promises import Promises
+from components.tracking.scans import Scans
 from dsa_des.running.simulation import Simulation
 
 OWN = {"lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 2000, "heading_deg": 0, "speed_mps": 60}
@@ -208,3 +212,28 @@ def test_a_miss_is_counted_once_in_the_time_that_is_promised():
     *_, last = rows(found, "state_tracks")
     assert last["track_status"] == "deleted"
     assert last["time_s"] - last["updated_s"] == pytest.approx(3 * 0.65)
+
+
+def test_velocities_of_looks_are_turned_into_the_axes_of_their_frames():
+    """Two looks from one place, with one and two detections; frames elsewhere, by pymap3d."""
+    place = np.array([[60.0, -30.0], [10.0, 179.5], [100.0, 900.0]])
+    origin = np.array([[61.0, -31.0], [4.0, -179.0], [0.0, 0.0]])
+    measured = np.arange(21.0).reshape(7, 3)
+    measured[:, 1] = np.nan
+    looks = _Looks(measured, np.array([0, 1, 3]), np.vstack([place, np.zeros((3, 2))]))
+    turned = Scans.in_frame(looks, origin).measured
+    assert turned is not measured and np.array_equal(turned[:4], measured[:4], equal_nan=True)
+    for entry, look in ((0, 0), (2, 1)):
+        ecef = pymap3d.enu2uvw(*measured[[5, 4], entry], -measured[6, entry], *place[:2, look])
+        east, north, up = pymap3d.uvw2enu(*ecef, *origin[:2, look])
+        assert turned[4:, entry] == pytest.approx([north, east, -up], abs=1e-6)
+    assert np.isnan(turned[4:, 1]).all()
+    silent = replace(looks, measured=np.full((7, 3), np.nan))
+    assert Scans.in_frame(silent, origin) is silent
+
+
+@dataclass(frozen=True)
+class _Looks:
+    measured: Any
+    offsets: Any
+    pose: Any

@@ -235,3 +235,16 @@ def test_the_sizes_of_the_standards_are_those_published():
     assert sizes["do365_en_route"] == pytest.approx((0.66 * 1852 / 0.3048, 450))
     assert PRESETS["do365_en_route"].horizontal_time_s == 35.0
     assert PRESETS["do365_terminal"].horizontal_time_s == 0.0
+
+
+@pytest.mark.parametrize("inward_m", [1e-4, 1e-6])
+def test_a_slow_pass_just_inside_lasts_as_long_as_its_chord(inward_m):
+    """At 1 m/s the discriminant of a circle of 100 m is 200 times the depth in metres."""
+    volume = Volume(100.0, 137.0, time_variable="none")
+    state = tuple(np.array([x]) for x in (-300.0, 100.0 - inward_m, 0.0, 1.0, 0.0, 0.0))
+    half_s = math.sqrt(inward_m * (200.0 - inward_m))
+    found = violation_span(volume, state, 0.0, 1000.0)
+    assert found.begin_s[0] == pytest.approx(300.0 - half_s, abs=1e-6)
+    assert found.end_s[0] == pytest.approx(300.0 + half_s, abs=1e-6)
+    outside = (state[0], 200.0 - state[1], *state[2:])
+    assert violation_span(volume, outside, 0.0, 1000.0) == (np.inf, -np.inf)

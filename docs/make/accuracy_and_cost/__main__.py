@@ -26,6 +26,7 @@ from components.line_of_sight.error_map import (
 )
 from docs.make.accuracy_and_cost.answers import head as answers_head
 from docs.make.accuracy_and_cost.answers import reports, section
+from docs.make.stamp import stamped
 from dsa_des.arrays.types import AnyArray
 from dsa_des.files.output_file import write_file
 from dsa_des.record.recording import Recorder
@@ -191,7 +192,8 @@ Which models may be crude without changing the answer?
 
 `dsa-des cost STUDY --answer RESULT` runs a study with each model in place of the scene's own, one at a
 time, on the same seeds, draws and encounters. A model may be taken where the *whole* interval of its change
-lies within the limit; not to have seen a change is no proof of none. All below is said by the command.
+lies within the limit; not to have seen a change is no proof of none. The command says all below, and in words what
+the tables show.
 
 {answers}
 
@@ -324,6 +326,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         encounter_says=options.encounter_says,
         trackers=_tables(third),
     )
+    page = stamped(page, "python -m docs.make.accuracy_and_cost")
     write_file(options.docs / "accuracy-and-cost.md", page.encode())
     return 0
 

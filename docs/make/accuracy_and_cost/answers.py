@@ -90,11 +90,44 @@ def section(made: Sequence[AnswerReport], studies: Sequence[AskedStudy] = STUDIE
 def _tables(report: AnswerReport) -> list[str]:
     lines: list[str] = []
     for result in report.results:
-        rows = list(report.cells(result.name))
+        every = list(report.cells(result.name))
+        rows = [row for row in every if row[-1] != "same"]
         used = [k for k in range(len(HEADS)) if any(row[k] for row in rows)]
         lines += [f"**{report.title_of(result.name)}**", ""]
         lines.append(f"| {' | '.join(HEADS[k] for k in used)} |")
         lines.append("|---" * len(used) + "|")
         lines += [f"| {' | '.join(row[k] for k in used)} |" for row in rows]
-        lines += ["", *(f"{line}\n" for line in report.sentences(result.name))]
+        same = [
+            f"{row[0]} ({row[1]}{'' if row[3] == '0 to 0' else f', {row[3]}'})"
+            for row in every
+            if row[-1] == "same"
+        ]
+        said = beside_the_table(report.sentences(result.name), same)
+        lines += ["", *(f"{line}\n" for line in said)]
     return [*lines, *(f"{line}  " for line in report.about()), ""]
+
+
+#: Sentences that list what the head of the page, or the column of verdicts, shows.
+_SHOWN = (
+    "May be taken",
+    "No model is surely",
+    "The cheapest is",
+    "None of them surely",
+    "Within it:",
+    "Surely changed",
+)
+
+
+def beside_the_table(sentences: Sequence[str], same: Sequence[str]) -> list[str]:
+    """Return what the sentences about a result say that the page does not show elsewhere.
+
+    Models with which no run differs are no rows of the table: `same` names them, with their CPU
+    and the interval of the change where it is no point.
+    """
+    rest = [line for line in sentences if not line.startswith(_SHOWN)]
+    return [
+        f"{line.partition('):')[0]}): {'; '.join(same)}."
+        if line.startswith("The same in every run")
+        else line
+        for line in rest
+    ]

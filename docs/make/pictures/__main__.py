@@ -25,6 +25,7 @@ from docs.make.pictures.looks import (
     scene_file,
 )
 from docs.make.pictures.matched import range_table, size_table
+from docs.make.stamp import stamped
 from dsa_des.block.mark import BLUE, PINK
 from dsa_des.files.output_file import write_file
 from dsa_des.record.drawing import drawing
@@ -289,7 +290,8 @@ def main(argv: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("page", type=Path)
     page = parser.parse_args(argv).page
-    write_file(page, (_page(page.parent / "images").rstrip() + "\n").encode())
+    text = _page(page.parent / "images")
+    write_file(page, stamped(text, "python -m docs.make.pictures docs/pictures.md").encode())
     return 0
 
 

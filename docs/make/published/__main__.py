@@ -12,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 import docs.make.published as package
+from docs.make.stamp import stamped
 from dsa_des.files.output_file import write_file
 from dsa_des.terminal.interruption import plain_ending
 
@@ -72,7 +73,8 @@ def main(arguments: list[str] | None = None) -> None:
     texts = {name: _without_title(text) for name, text in old.items()}
     for name, module in sections().items():
         if name in given.sections or not given.sections:
-            texts[name] = module.section(given.page.parent / "images").strip("\n")
+            text = module.section(given.page.parent / "images").strip("\n")
+            texts[name] = stamped(text, f"python -m docs.make.published {name}").rstrip("\n")
     write_file(given.page, joined(texts).encode("utf-8"))
 
 

@@ -130,9 +130,13 @@ def text_of(lines: Lines) -> str:
         "\n".join(["| sensor | tracker | all bounds met at, nmi |", "|---|---|---|", *reach])
     )
     for sensor in BOUNDS:
+        # Trackers that agree to the last digit shown have one table.
+        alike: dict[str, list[str]] = {}
         for tracker in TRACKERS:
             if (tracker, sensor) in known:
-                parts.append(f"**{sensor}, `{tracker}`**\n\n{table(lines, tracker, sensor)}")
+                alike.setdefault(table(lines, tracker, sensor), []).append(f"`{tracker}`")
+        for text, trackers in alike.items():
+            parts.append(f"**{sensor}, {' and '.join(trackers)}**\n\n{text}")
     failed = [
         f"- {sensor}, `{tracker}`: {said}"
         for tracker, sensor in sorted(known, key=lambda one: one[1])

@@ -56,6 +56,13 @@ def _keys(rows: Iterable[Row], links: str) -> list[str]:
     return table + ([f"{'Also the' if rows else 'The'} keys of {links}.\n"] if links else [])
 
 
+def _frames(tables: dict[str, dict[str, Column]]) -> dict[str, str]:
+    """Return frame → letter of the frames whose names are long."""
+    frames = [column[1] for _, columns in sorted(tables.items()) for column in columns.values()]
+    long = [frame for frame in dict.fromkeys(frames) if len(frame.split()) > 2]
+    return {frame: chr(ord("A") + number) for number, frame in enumerate(long)}
+
+
 def page() -> str:
     """Return the page as Markdown."""
     parts = [_HEAD, "## Scene files\n"]
@@ -73,14 +80,19 @@ def page() -> str:
         parts += [f"### {title}\n", f"{said}\n", *_keys(own, links)]
     parts.append("## Tables of a run folder\n")
     kinds = recorded_tables()
+    letters = _frames(kinds)
     every = [(name, "", *column[:3]) for name, column in LEADING.items()]
     heads = ("column", "type", "unit", "frame", "meaning")
+    legend = "; ".join(f"{letter} {frame}" for frame, letter in letters.items())
     parts += [
-        "Every table is a Parquet file and begins with these columns:\n",
+        f"Every table is a Parquet file. Frames: {legend}. All begin with these columns:\n",
         _table(heads, every),
     ]
     for table, columns in sorted(kinds.items()):
-        rows_of = [(name, column.kind, *column[:3]) for name, column in columns.items()]
+        rows_of = [
+            (name, column.kind, column[0], letters.get(column[1], column[1]), column[2])
+            for name, column in columns.items()
+        ]
         parts += [f"### {table}\n", _table(heads, rows_of)]
     parts += ["## Traffic files\n", "### Tables (`traffic.file`)\n"]
     names = ("quantity", "accepted names")

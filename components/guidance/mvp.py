@@ -1,0 +1,177 @@
+"""An avoidance that steers by velocities, as multirotors fly (``avoidance.mvp``)."""
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from components.geometry import enu_to_geodetic, line_of_sight_ned
+from components.guidance.potential import KeptApart, Others, conflicts, may_resume, pushed
+from components.messages.alerts import AlertLevels
+from components.messages.reach import FarthestLook
+from components.messages.steering import Velocities
+from components.messages.targets import TrafficStates
+from dsa_des.arrays.keyed_table import KeyedTable, turns
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.component import Component, Input, Output, Parameters
+from dsa_des.block.wake import Wake
+
+# Within this of its goal an aircraft stays; it flies to it no faster than in a second.
+_AT_GOAL_M, _LAST_S = 0.5, 1.0
+
+
+class PotentialParameters(Parameters):
+    """Parameters of the modified voltage potential."""
+
+    radius_m: float = Field(default=50.0, gt=0, description="Others are to stay so far away, m.")
+    margin: float = Field(
+        default=1.05, ge=1, le=10, description="Steer for a radius so many times as large."
+    )
+    lookahead_s: float = Field(
+        default=120.0, gt=0, le=3600, description="Conflicts farther ahead do not count, s."
+    )
+    speed_mps: float = Field(
+        gt=0, le=400, description="Speed along its own way: its first track, or to its goal, m/s."
+    )
+    most_mps: float = Field(default=18.0, gt=0, le=400, description="Largest speed commanded, m/s.")
+    acceleration_mps2: float = Field(
+        default=5.0, gt=0, le=100, description="Acceleration to a commanded velocity, m/s²."
+    )
+    goal_m: float | None = Field(
+        default=None, gt=0, le=100_000, description="Its goal, where it stops, lies so far ahead "
+        "of where it is first seen, m; by default it flies on for ever.",
+    )  # fmt: skip
+
+
+class VoltagePotential(Component):
+    """Leads a multirotor out of conflicts by the modified voltage potential.
+
+    A pair is active from its first conflict until it is past and apart. With conflicts the velocity
+    is the one they push to; with active pairs only, that of the moment is kept; else it is that of
+    its own way: along its first track, or to its goal from where it truly is. Only what is another
+    velocity than before is commanded.
+    """
+
+    inputs = {
+        "alerts": Input(AlertLevels, "trigger", "Where others are, whatever their level."),
+        "states": Input(TrafficStates, "sampled", "Where it is: for its own way."),
+    }
+    outputs = {"manoeuvres": Output(Velocities, "Velocities that it is told to fly.")}
+    Parameters = PotentialParameters
+    remembers = ("_known",)
+    windowed = True
+    lockstep = True
+    rewindable = True
+
+    @classmethod
+    def may_climb(cls, parameters: PotentialParameters) -> bool:
+        """Return that it never commands another altitude."""
+        return False
+
+    def request(self, port: str) -> FarthestLook | None:
+        """Ask for no target in the states: of these only one's own place is read."""
+        return FarthestLook(0.0) if port == "states" else None
+
+    def setup(self) -> None:
+        """Start without having seen anybody."""
+        self._kept = KeptApart(self.p.radius_m, self.p.margin, self.p.lookahead_s)
+        #: By run: which others are active, first track, goal, and the last velocity commanded.
+        self._known = KeyedTable.empty({"replica": int})
+
+    def run(self, wake: Wake) -> Velocities | None:
+        """Decide at every instant, of each run one after the other."""
+        alerts, states = wake["alerts"], wake["states"]
+        if alerts is None or states is None:
+            return None
+        others, own_mps, heard = _dense(alerts)
+        place = np.array([states.own_lat_deg, states.own_lon_deg, states.own_alt_m])
+        commanded = np.full((2, len(wake)), math.nan)
+        for rows in turns(wake.run):
+            run = wake.run[rows]
+            yaw = states.own_yaw_rad[rows]
+            new = KeyedTable(
+                replica=run,
+                active=np.zeros((heard.shape[1], len(rows)), dtype=bool),
+                track=yaw,
+                goal=self._goal(place[:, rows], yaw),
+                last_mps=np.full((2, len(rows)), math.nan),
+            )
+            known = self._known.continued(new) if len(self._known) else new
+            some = Others(*(part[:, rows] for part in others))
+            own = own_mps[:, rows]
+            now = conflicts(some, self._kept) & heard[rows]
+            done = may_resume(some, own, self._kept) | ~np.isfinite(own[0])[:, np.newaxis]
+            active = now | (known.active.T & ~(done & heard[rows]))
+            velocity = self._own_way(known, place[:, rows])
+            velocity = np.where(active.any(axis=1), own, velocity)
+            with np.errstate(invalid="ignore"):
+                out = pushed(some, own, now, self._kept)
+            velocity = self._cut(np.where(now.any(axis=1), out, velocity))
+            # Nothing is told to who has not been steered, and flies its own way without it.
+            silent = np.isnan(known.last_mps[0]) & ~active.any(axis=1) & (self.p.goal_m is None)
+            same = (velocity == known.last_mps).all(axis=0) | silent
+            velocity = np.where(same | np.isnan(velocity[0]), known.last_mps, velocity)
+            told = (velocity != known.last_mps).any(axis=0) & np.isfinite(velocity[0])
+            commanded[:, rows[told]] = velocity[:, told]
+            newer = known.with_columns(active=active.T.copy(), last_mps=velocity)
+            self._known = self._known.after(run, newer, wake.first_run)
+        return self._velocities(wake, commanded)
+
+    def _own_way(self, known: KeyedTable, place: FloatArray) -> FloatArray:
+        """Return the velocity (2, n) of who has no conflict."""
+        if self.p.goal_m is None:
+            return self.p.speed_mps * np.stack([np.sin(known.track), np.cos(known.track)])
+        north, east, _ = line_of_sight_ned(*place, *known.goal, validate=False)
+        left_m = np.hypot(east, north)
+        speed_mps = np.minimum(self.p.speed_mps, np.sqrt(2.0 * self.p.acceleration_mps2 * left_m))
+        speed_mps = np.minimum(speed_mps, left_m / _LAST_S)
+        per_m = np.where(left_m < _AT_GOAL_M, 0.0, speed_mps / np.maximum(left_m, _AT_GOAL_M))
+        return np.stack([east * per_m, north * per_m])
+
+    def _goal(self, place: FloatArray, yaw: FloatArray) -> FloatArray:
+        """Return latitudes, longitudes and altitudes (3, n) of goals ahead of places."""
+        goal_m = self.p.goal_m or 0.0
+        return np.stack(
+            enu_to_geodetic(
+                goal_m * np.sin(yaw), goal_m * np.cos(yaw), np.zeros_like(yaw),
+                reference_lat_deg=place[0], reference_lon_deg=place[1],
+                reference_alt_m=place[2],
+            )
+        )  # fmt: skip
+
+    def _cut(self, velocity: FloatArray) -> FloatArray:
+        """Return velocities no larger than the largest."""
+        speed_mps = np.hypot(*velocity)
+        return np.asarray(velocity * np.minimum(1.0, self.p.most_mps / np.maximum(speed_mps, 1e-9)))
+
+    def _velocities(self, wake: Wake, commanded: FloatArray) -> Velocities | None:
+        rows = np.flatnonzero(np.isfinite(commanded[0]))
+        if not len(rows):
+            return None
+        told = wake.instants.take(rows)
+        zero, (east, north) = np.zeros(len(rows)), commanded[:, rows].copy()
+        return Velocities(
+            told.tick, zero, zero, acceleration_mps2=zero + self.p.acceleration_mps2,
+            velocity_east_mps=east, velocity_north_mps=north, run=told.run,
+        )  # fmt: skip
+
+
+def _dense(alerts: AlertLevels) -> tuple[Others, FloatArray, BoolArray]:
+    """Return others of each row by target, NaN where not heard, own velocities, and who is heard.
+
+    Positions in alerts are the ownship's less the target's.
+    """
+    row: IntArray = alerts.row_of_entries
+    shape = len(alerts), len(alerts.roster)
+    known = alerts.target >= 0
+    at = row[known], alerts.target[known]
+    heard = np.zeros(shape, dtype=bool)
+    heard[at] = True
+    parts = []
+    for names in (("east_m", "north_m"), ("east_mps", "north_mps")):
+        part = np.full((2, *shape), math.nan)
+        for axis, name in zip(part, names, strict=True):
+            axis[at] = -alerts.relative[name][known]
+        parts.append(part)
+    own = np.array([alerts.own_motion[name] for name in ("east_mps", "north_mps")])
+    return Others(*parts), own, heard

@@ -1,0 +1,89 @@
+"""The modified voltage potential: conflicts of straight flights, and a velocity out of them.
+
+Each pair by itself pushes the velocity away from where the other one will be closest; pushes add
+up. What is remembered is which pairs have been in conflict and may not resume yet.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dsa_des.arrays.types import BoolArray, FloatArray
+
+# Closer than this pass straight through each other; the way out is then to the left of the line.
+_LEAST_MISS_M, _LEAST_TIME_S, _LEAST_SPEED2 = 0.1, 1e-6, 1e-9
+# Tracks so near to each other are parallel, and keep the larger radius before they resume.
+_PARALLEL_RAD = np.radians(30.0)
+
+
+class KeptApart(NamedTuple):
+    """What is to be kept: a radius, times so much where one steers, within a time."""
+
+    radius_m: float
+    margin: float
+    lookahead_s: float
+
+
+class Others(NamedTuple):
+    """Positions and velocities of others, (2, n, others) east and north, relative to one's own."""
+
+    position_m: FloatArray
+    velocity_mps: FloatArray
+
+
+def closest(others: Others) -> tuple[FloatArray, FloatArray]:
+    """Return when others are closest, s, and where they are then, m (2, n, others)."""
+    speed2 = (others.velocity_mps**2).sum(axis=0)
+    closing = -(others.position_m * others.velocity_mps).sum(axis=0)
+    time_s = closing / np.maximum(speed2, _LEAST_SPEED2)
+    return time_s, others.position_m + others.velocity_mps * time_s
+
+
+def conflicts(others: Others, kept: KeptApart) -> BoolArray:
+    """Return which others come within the radius in time, (n, others); NaN never does."""
+    speed2 = (others.velocity_mps**2).sum(axis=0)
+    time_s, miss = closest(others)
+    inside2 = kept.radius_m**2 - (miss**2).sum(axis=0)
+    half_s = np.sqrt(np.maximum(inside2, 0.0) / np.maximum(speed2, _LEAST_SPEED2))
+    meets = (inside2 > 0.0) & (time_s - half_s < kept.lookahead_s) & (time_s + half_s > 0.0)
+    return np.asarray(meets & (speed2 >= _LEAST_SPEED2))
+
+
+def may_resume(others: Others, own_mps: FloatArray, kept: KeptApart) -> BoolArray:
+    """Return which others are past, apart, and not beside one on nearly one's own track.
+
+    `own_mps` is one's own velocity (2, n).
+    """
+    past = (others.position_m * others.velocity_mps).sum(axis=0) > 0.0
+    range_m = np.hypot(*others.position_m)
+    own = own_mps[:, :, np.newaxis]
+    track, theirs = np.arctan2(*own), np.arctan2(*(own + others.velocity_mps))
+    apart_rad = np.abs((theirs - track + np.pi) % (2.0 * np.pi) - np.pi)
+    beside = (apart_rad < _PARALLEL_RAD) & (range_m < kept.margin * kept.radius_m)
+    return np.asarray(past & (range_m >= kept.radius_m) & ~beside)
+
+
+def pushed(others: Others, own_mps: FloatArray, pushing: BoolArray, kept: KeptApart) -> FloatArray:
+    """Return the velocity (2, n) that some others push one's own to.
+
+    Notes
+    -----
+    Each pushes against where it will be closest by what is missing there of the radius, in the time
+    until then; the radius is stretched so that the circle about the other is touched, not cut.
+    Hoekstra, van Gent & Ruigrok, "Designing for safety: the 'free flight' air traffic management
+    concept", Reliability Engineering & System Safety 75, 2002.
+    """
+    radius_m = kept.margin * kept.radius_m
+    time_s, miss = closest(others)
+    range_m, miss_m = np.hypot(*others.position_m), np.hypot(*miss)
+    through = miss_m <= _LEAST_MISS_M
+    east, north = others.position_m
+    aside = _LEAST_MISS_M * np.stack([north, -east]) / np.maximum(range_m, 1e-12)
+    miss, miss_m = np.where(through, aside, miss), np.where(through, _LEAST_MISS_M, miss_m)
+    outside = (radius_m < range_m) & (miss_m < range_m)
+    far_m = np.where(outside, range_m, 1.0)
+    angle = np.arcsin(np.where(outside, radius_m / far_m, 0.0))
+    angle = angle - np.arcsin(np.where(outside, miss_m / far_m, 0.0))
+    gain_m = np.where(outside, radius_m / np.cos(angle), radius_m) - miss_m
+    push = gain_m / (np.maximum(np.abs(time_s), _LEAST_TIME_S) * miss_m) * miss
+    return np.asarray(own_mps - np.where(pushing, push, 0.0).sum(axis=-1))
