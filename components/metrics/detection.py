@@ -26,6 +26,7 @@ from components.metrics.rows import (
     with_trials,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.replicas.times_out import may_be_out, times_out
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import (
     EVENT,
@@ -37,7 +38,6 @@ from dsa_des.studies.metric import (
     Told,
     recorded_by,
 )
-from dsa_des.studies.times_out import may_be_out, times_out
 
 ANY = "any"
 #: Columns of detections that `declarations` needs.
@@ -175,7 +175,7 @@ class DetectionShare(TargetMetric):
             rows = detections
             successes = np.bincount(rows["replica"][hits], minlength=len(group))
             values |= with_trials(f"detection_share.{name}", successes, trials)
-        for name, spans in times_out(group).items():
+        for name, spans in times_out(group.scene, group.replicas, group.duration_s).items():
             if name in self.names:
                 out_s = np.array([(each[:, 1] - each[:, 0]).sum() for each in spans])
                 values[f"out_share.{name}"] = out_s / group.duration_s

@@ -29,9 +29,9 @@ from components.metrics.rows import (
 from components.metrics.separation import RelativeFlight, traffic_block
 from components.well_clear.volume import PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
+from dsa_des.replicas.times_out import may_be_out, out_between, times_out
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, RATIO, Group, RatioOf, Result, recorded_by
-from dsa_des.studies.times_out import may_be_out, out_between, times_out
 
 #: By what an approach may be censored, see `components.flights.closest_approach.end_of_look`.
 _ENDS = ("", START, END, "the start of its flight", "the end of its flight")
@@ -366,9 +366,10 @@ class AlertTimes(FlownMetric):
             }.items():
                 values[f"alert_{what}.{name}"] = event.any(axis=1).astype(float)
             if name in self._behind:
-                due = out_between(
-                    times_out(group), self._behind[name], lost_s - self.p.late_s, lost_s
+                out = group.once(
+                    times_out, lambda: times_out(group.scene, group.replicas, group.duration_s)
                 )
+                due = out_between(out, self._behind[name], lost_s - self.p.late_s, lost_s)
                 event = (missed & due).any(axis=1)
                 values[f"alert_missed_while_out.{name}"] = event.astype(float)
         return values

@@ -11,9 +11,9 @@ from wired import chain
 import dsa_des
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.times_out import times_out_s
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.block_table import Outage
-from dsa_des.studies.times_out import times_out_s
 
 #: What sees the intruder 100 m away: well clear is lost long before.
 NEAR_RADAR = {
@@ -103,6 +103,7 @@ def test_each_run_is_out_when_its_simulation_is_whatever_runs_beside_it(conf):
     failing = [
         {"blocks": ["radar", "tracker"], "mean_between_s": 9, "mean_repair_s": 5, "name": "bus"},
         {"blocks": ["radar"], "mean_between_s": 7, "mean_repair_s": 3, "restart_s": 1},
+        {"blocks": ["fusion"], "mean_between_s": 5, "mean_repair_s": 5},
     ]
     scene = dsa_des.load_scene(watched(conf, outages=failing, changes=[off("radar", 3, 9)]))
     assert scene.outages == [Outage(**one) for one in failing]
@@ -120,6 +121,7 @@ def test_each_run_is_out_when_its_simulation_is_whatever_runs_beside_it(conf):
         up &= (time_s < 3) | (time_s >= 9)
         inside = ((time_s[:, None] >= spans[:, 0]) & (time_s[:, None] < spans[:, 1])).any(axis=1)
         assert np.count_nonzero(inside == up) == 0
+        assert (spans[1:, 0] > spans[:-1, 1]).all()  # spans that touch are one
 
 
 def test_a_run_that_is_switched_off_by_its_own_draw_is_out_until_it_is_switched_on(conf):

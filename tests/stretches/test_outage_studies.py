@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 import dsa_des
-from docs.make.outages import moment_rows, risk_rows
+from docs.make.outages.__main__ import moment_rows, risk_rows
 from dsa_des.cli import main
 from dsa_des.files.toml_files import to_toml
 

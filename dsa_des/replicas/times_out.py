@@ -9,10 +9,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from dsa_des.arrays.types import BoolArray, FloatArray
+from dsa_des.replicas.changed_scene import Replica
+from dsa_des.replicas.drawn_columns import scenes_of
 from dsa_des.scene.changes import TimedChange
 from dsa_des.scene.scene import Scene
 from dsa_des.stretches.outages import Outages, merged
-from dsa_des.studies.metric import Group
 from dsa_des.time.randomness import Streams
 from dsa_des.time.runs import Runs
 
@@ -58,20 +59,16 @@ def times_out_s(scene: Scene, seeds: Sequence[int], ends_s: FloatArray) -> Times
     return result
 
 
-def times_out(group: Group) -> TimesOut:
-    """Return when the blocks of every replica of a group are out."""
-    return group.once("times out", lambda: _times_out(group))
-
-
-def _times_out(group: Group) -> TimesOut:
-    seeds = [replica.seed for replica in group.replicas]
-    if not any(key.endswith(".enabled") for one in group.replicas for key in one.changes):
-        return times_out_s(group.scene, seeds, group.duration_s)
+def times_out(scene: Scene, replicas: Sequence[Replica], ends_s: FloatArray) -> TimesOut:
+    """Return when blocks that may be out are, in each of some replicas of a scene."""
+    seeds = [replica.seed for replica in replicas]
+    if not any(key.endswith(".enabled") for one in replicas for key in one.changes):
+        return times_out_s(scene, seeds, ends_s)
     each = [
-        times_out_s(scene, [seed], group.duration_s[[number]])
-        for number, (scene, seed) in enumerate(zip(group.scenes, seeds, strict=True))
+        times_out_s(one, [seed], ends_s[[number]])
+        for number, (one, seed) in enumerate(zip(scenes_of(scene, replicas), seeds, strict=True))
     ]
-    return {name: [one[name][0] for one in each] for name in may_be_out(group.scene)}
+    return {name: [one[name][0] for one in each] for name in may_be_out(scene)}
 
 
 def _switched(change: TimedChange) -> set[str]:
