@@ -137,7 +137,7 @@ class FlownMetric(TargetMetric):
         names = table["block"].names
         rows = zip(
             table["replica"].tolist(), table["block"].codes.tolist(), table["time_s"].tolist(),
-            *(table[name].tolist() for name in _COLUMNS), strict=True,
+            *(_told_by(table, name) for name in _COLUMNS), strict=True,
         )  # fmt: skip
         for replica, block, time_s, *values in rows:
             if names[block] not in self.delays_s:
@@ -302,6 +302,13 @@ def flights_of(
     for number, new_flights in by_run.items():
         runs[run_of[number]] = [flight.flown(new_flights) for flight in runs[run_of[number]]]
     return runs, run_of if some is None else run_of[some]
+
+
+def _told_by(table: Any, name: str) -> list[float]:
+    """Return what manoeuvres say; NaN of what no block commands, such as velocities."""
+    nothing = np.full(len(table["replica"]), np.nan)
+    values: list[float] = table.get(name, nothing).tolist()
+    return values
 
 
 def _by_platform(told: Sequence[_Told]) -> dict[int, list[tuple[float, Manoeuvre]]]:
