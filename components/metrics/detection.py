@@ -26,8 +26,18 @@ from components.metrics.rows import (
     with_trials,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.replicas.times_out import may_be_out, times_out
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import EVENT, NUMBER, SHARE, Group, Result, Told, recorded_by
+from dsa_des.studies.metric import (
+    EVENT,
+    FRACTION,
+    NUMBER,
+    SHARE,
+    Group,
+    Result,
+    Told,
+    recorded_by,
+)
 
 ANY = "any"
 #: Columns of detections that `declarations` needs.
@@ -129,7 +139,10 @@ def first_row(columns: Any, rows: IntArray, count: int) -> IntArray:
 
 
 class DetectionShare(TargetMetric):
-    """Share of the looks at targets inside a sensor's reach that detect."""
+    """Share of the looks at targets inside a sensor's reach that detect.
+
+    Of a sensor that fails, or that changes switch off, also the share of the run that it was out.
+    """
 
     Parameters = SensorMetricParameters
     tables = {"detections": ("block", "target"), "scans": ("block", "evaluated")}
@@ -141,9 +154,12 @@ class DetectionShare(TargetMetric):
         self.names = sensors_of(scene, parameters.sensors)
 
     def results(self) -> list[Result]:
-        """Return one share per sensor."""
+        """Return one share per sensor, and how long each that may be out was."""
         meaning = "detections per look at a target in reach"
-        return [Result(f"detection_share.{name}", SHARE, meaning) for name in self.names]
+        shares = [Result(f"detection_share.{name}", SHARE, meaning) for name in self.names]
+        out = sorted(set(self.names).intersection(may_be_out(self.scene)))
+        meaning = "share of the run in which it was out"
+        return [*shares, *(Result(f"out_share.{name}", FRACTION, meaning) for name in out)]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Count looks and detections of every replica."""
@@ -159,6 +175,10 @@ class DetectionShare(TargetMetric):
             rows = detections
             successes = np.bincount(rows["replica"][hits], minlength=len(group))
             values |= with_trials(f"detection_share.{name}", successes, trials)
+        for name, spans in times_out(group.scene, group.replicas, group.duration_s).items():
+            if name in self.names:
+                out_s = np.array([(each[:, 1] - each[:, 0]).sum() for each in spans])
+                values[f"out_share.{name}"] = out_s / group.duration_s
         return values
 
 

@@ -8,6 +8,7 @@ horizontally and 250 ft vertically; a near mid-air collision is 500 ft and 100 f
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import networkx as nx
 import numpy as np
 from pydantic import Field
 
@@ -28,8 +29,9 @@ from components.metrics.rows import (
 from components.metrics.separation import RelativeFlight, traffic_block
 from components.well_clear.volume import PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
+from dsa_des.replicas.times_out import may_be_out, out_between, times_out
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import EVENT, NUMBER, Group, Result, recorded_by
+from dsa_des.studies.metric import EVENT, NUMBER, RATIO, Group, RatioOf, Result, recorded_by
 
 #: By what an approach may be censored, see `components.flights.closest_approach.end_of_look`.
 _ENDS = ("", START, END, "the start of its flight", "the end of its flight")
@@ -224,6 +226,16 @@ class WellClear(_Encounter):
         return values
 
 
+def _behind(scene: Scene, block: str) -> list[str]:
+    """Return which blocks may be out of those that a block hears, itself among them.
+
+    What steers the traffic is not: no alert is made of it.
+    """
+    graph = scene.graph.copy()
+    graph.remove_edges_from(list(graph.in_edges(traffic_block(scene).name)))
+    return sorted({block, *nx.ancestors(graph, block)}.intersection(may_be_out(scene)))
+
+
 def _least(values: FloatArray, counts: BoolArray | None = None) -> FloatArray:
     """Return the least value of each replica's targets (replicas, targets); NaN without any.
 
@@ -281,6 +293,9 @@ class AlertTimes(FlownMetric):
     well clear of it is never lost, and a *surprise* if the level below had not been on for
     `surprise_s` when it came. A run has what any of its aircraft has; of several times to a loss
     the shortest counts, and there is none where one was missed.
+
+    Where blocks of the scene may be out, an alert is *missed while out* if it is missed and one of
+    the blocks that it is made of was out within the last `late_s` before the loss.
     """
 
     Parameters = AlertTimeParameters
@@ -292,6 +307,8 @@ class AlertTimes(FlownMetric):
         #: Whether losses are of what was flown, so that a run that ended early has no later ones.
         self._as_flown = parameters.steered or all(w.target != traffic for w in scene.wires)
         self._blocks = self.on_platform(recorded_by(scene, "alerts"))
+        #: Which blocks may be out behind each of them that has any.
+        self._behind = {name: of for name in self._blocks if (of := _behind(scene, name))}
 
     def results(self) -> list[Result]:
         """Return times and events of each alerting block."""
@@ -308,6 +325,15 @@ class AlertTimes(FlownMetric):
                 Result(f"alert_nuisance.{name}", EVENT, "alert, and well clear is never lost"),
                 Result(f"alert_surprise.{name}", EVENT, "alert hardly after the level below it"),
             ]
+            if name in self._behind:
+                missed, of_out = f"alert_missed.{name}", f"alert_missed_while_out.{name}"
+                said = f"missed, and {' or '.join(self._behind[name])} was out when it was due"
+                share = RatioOf(missed, of_out, share=True)
+                results += [
+                    Result(of_out, EVENT, said),
+                    Result(f"missed_while_out_share.{name}", RATIO, "share of the missed that were "
+                           "while something was out", ratio=share),
+                ]  # fmt: skip
         return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
@@ -339,6 +365,13 @@ class AlertTimes(FlownMetric):
                 "surprise": sudden,
             }.items():
                 values[f"alert_{what}.{name}"] = event.any(axis=1).astype(float)
+            if name in self._behind:
+                out = group.once(
+                    times_out, lambda: times_out(group.scene, group.replicas, group.duration_s)
+                )
+                due = out_between(out, self._behind[name], lost_s - self.p.late_s, lost_s)
+                event = (missed & due).any(axis=1)
+                values[f"alert_missed_while_out.{name}"] = event.astype(float)
         return values
 
 

@@ -286,13 +286,17 @@ class Component:
         return one
 
     def take_over(self, before: "Component") -> None:
-        """Go on from what this block remembers under the parameters that it had `before`."""
-        for name in type(self).remembers or ():
-            setattr(self, name, getattr(before, name))
-        for name, built in self.context.effects.items():
-            old = before.context.effects.get(name)
-            for attribute in getattr(built, "remembers", ()) if old is not None else ():
-                setattr(built, attribute, getattr(old, attribute))
+        """Go on from what this block remembers under the parameters that it had `before`.
+
+        What it makes at its first wake is not there where it changes before that.
+        """
+        pairs: list[tuple[Any, Any]] = [(self, before)]
+        of_before = before.context.effects
+        pairs += [(new, of_before.get(name)) for name, new in self.context.effects.items()]
+        for new, old in pairs:
+            for name in getattr(new, "remembers", None) or ():
+                if hasattr(old, name):
+                    setattr(new, name, getattr(old, name))
 
     def serves_replicas(self) -> bool:
         """Return whether this block may serve replicas in lock step."""

@@ -86,17 +86,25 @@ class Outages:
                     arrived.setdefault(port, []).append(part)
         return wake.part(np.arange(len(wake)), arrived) if wake._arrived else wake
 
+    def spans(self, run: int) -> IntArray:
+        """Return when the block is out in a run, in order: first tick, and the first after it."""
+        spans = np.concatenate([e.tick.reshape(self._runs.count, -1)[run] for e in self._edges])
+        return merged(spans.reshape(-1, 2), int(self._runs.ends[run]))
+
     def undone(self) -> Mapping[str, IntArray]:
         """Return of how many seconds of each run the block was out, as counts (2, runs)."""
         ends = self._runs.ends
-        out = np.zeros(self._runs.count, dtype=np.int64)
-        each = [edges.tick.reshape(self._runs.count, -1) for edges in self._edges]
-        for run in range(self._runs.count):
-            spans = [s for ticks in each for s in ticks[run].reshape(-1, 2).tolist()]
-            reached = 0
-            for first, last in sorted(spans):  # those that overlap count once
-                first, last = max(first, reached), min(last, int(ends[run]))
-                out[run] += max(0, last - first)
-                reached = max(reached, last)
+        each = map(self.spans, range(self._runs.count))
+        out = [int((spans[:, 1] - spans[:, 0]).sum()) for spans in each]
         seconds = np.rint(np.array([out, ends]) / self._ticks_per_s).astype(np.int64)
         return {SECONDS_OUT: seconds}
+
+
+def merged(spans: IntArray, end: int) -> IntArray:
+    """Return spans of ticks (spans, 2) before an end, in order, those that touch as one."""
+    first, last = np.minimum(spans[np.argsort(spans[:, 0], kind="stable")], end).T
+    reached = np.maximum.accumulate(last)
+    new = np.append(True, first[1:] > reached[:-1])[: len(first)]
+    ends = reached[np.append(new[1:], True)[: len(first)]]
+    whole = np.stack([first[new], ends], axis=1)
+    return whole[whole[:, 1] > whole[:, 0]]

@@ -14,6 +14,7 @@ from dsa_des.cli import main
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
+from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.running.simulation import Simulation
 from dsa_des.time.changing_clock import ChangingClock
 from dsa_des.time.clock import ClockSpec
@@ -200,6 +201,16 @@ def test_what_is_remembered_goes_on_in_any_window_and_beside_other_runs():
     assert set(number[time_s < 14.3]) & set(number[time_s > 19])
     at_halves = [t for t in scans_of(whole["alerts"]) if t % 1]
     assert min(at_halves) >= 26
+
+
+def test_a_change_at_the_start_is_what_the_scene_begins_as():
+    """What a block makes at its first wake is not there yet to go on from."""
+    key = "blocks.radar.range_km"
+    whole = same_in_any_window(scene(change(key, 4.5, at_s=0), tracks=True))
+    begun = scene_of(scene(tracks=True), Replica(3, {key: 4.5}))
+    for name, table in tables_of(begun)[1].items():
+        assert rows_of(whole[name], lambda t: t >= 0).equals(rows_of(table, lambda t: t >= 0)), name
+    assert whole["alerts"].num_rows
 
 
 def test_a_delay_that_changes_holds_for_what_is_made_from_then_on():

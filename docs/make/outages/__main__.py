@@ -1,0 +1,82 @@
+"""``python -m docs.make.outages RISK MOMENT``: the tables of a radar's outages, of docs/scenes.md.
+
+The folders are those of ``dsa-des study radar_outage_risk`` and ``radar_outage_moment``.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import pandas as pd  # type: ignore[import-untyped]
+
+from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.terminal import say
+
+_EVENTS = ("nmac", "well_clear_lost")
+_NEVER = "never"
+_LEAD, _MISSED, _OUT = "alert_to_loss_s.alerting", "alert_missed.alerting", "out_share.radar"
+
+
+def risk_rows(folder: Path) -> list[str]:
+    """Return the lines of the table of risk over outages.
+
+    Alerts missed because of an outage are those that the run of the same draws without one has.
+    """
+    ratios, runs = (pd.read_parquet(folder / name) for name in ("ratios.parquet", "parts"))
+    lines = [
+        "| mean time up, to repair | out | NMAC, risk ratio, 95 % | loss of well clear | "
+        "alerts missed | because of it | missed while out |",
+        "|---" * 7 + "|",
+    ]
+    never = runs[runs.outage == _NEVER].set_index("replica")[_MISSED]
+    for outage, mine in runs.groupby("outage", sort=False):
+        of = ratios[ratios.outage == outage].set_index("result")
+        cells = [
+            f"{one.ratio:.2f} ({one.gamma_low:.2f} to {one.gamma_high:.2f})"
+            for one in (of.loc[f"{event}_risk_ratio"] for event in _EVENTS)
+        ]
+        missed = mine.set_index("replica")[_MISSED]
+        because = int((missed > never[missed.index]).sum())
+        while_out = int(mine["alert_missed_while_out.alerting"].sum())
+        counts = f"{int(missed.sum())} of {len(mine)} | {because} | {while_out}"
+        share = f"{100 * mine[_OUT].mean():.0f} %"
+        lines.append(f"| {outage} | {share} | {' | '.join(cells)} | {counts} |")
+    return lines
+
+
+def moment_rows(folder: Path) -> list[str]:
+    """Return the lines of the table of what an alert loses, over when the failure begins.
+
+    It loses what it has in the last cell, whose failure begins after all alerts.
+    """
+    runs = pd.read_parquet(folder / "parts")
+    late = runs[runs.fails_at_s == runs.fails_at_s.max()].set_index("replica")
+    lines = [
+        "| fails at, s | from alert to loss, s | lost, s | most lost, s | without any alert |",
+        "|---" * 5 + "|",
+    ]
+    for fails_s, mine in runs.groupby("fails_at_s"):
+        lead = mine.set_index("replica")[_LEAD]
+        lost = late[_LEAD] - lead
+        missed = f"{int(mine[_MISSED].sum())} of {len(mine)}"
+        each = f"{lead.mean():.1f} | {lost.mean():.1f} | {lost.max():.1f}"
+        lines.append(f"| {fails_s:g} | {each} | {missed} |")
+    return lines
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command and return its exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m docs.make.outages", description="Print the tables of a radar's outages."
+    )
+    parser.add_argument("risk", type=Path, help="of dsa-des study radar_outage_risk")
+    parser.add_argument("moment", type=Path, help="of dsa-des study radar_outage_moment")
+    folders = parser.parse_args(arguments)
+    for line in (*risk_rows(folders.risk), "", *moment_rows(folders.moment)):
+        say(line)
+    return 0
+
+
+if __name__ == "__main__":
+    with plain_ending():
+        sys.exit(main())
