@@ -23,7 +23,7 @@ from tests.alerting.conf_text import CONF
 #: behind it, "refused" where a scene with it does not start. Of each, that it never ran is said.
 SAID = {
     "alerting.daidalus": "check run", "alerting.m_of_n": "check", "avoidance.daidalus": "check run",
-    "avoidance.horizontal_cas": "refused", "avoidance.turn_away": "check run",
+    "avoidance.horizontal_cas": "refused", "avoidance.mvp": "", "avoidance.turn_away": "check run",
     "encounters.closest_approach_passed": "", "foreign.fmu": "refused run",
     "foreign.mavlink": "check run", "foreign.process": "run",
     "fusion.covariance_intersection": "run", "fusion.gated": "run", "fusion.pass_through": "",
@@ -35,7 +35,8 @@ SAID = {
     "optical.projection": "check run", "optical.range_boundary": "refused",
     "radar.range_boundary": "refused", "radar.swerling": "check run",
     "radar.threshold": "check run", "sensor.recorded": "check refused",
-    "surveillance.active": "check", "surveillance.ads_b": "check", "tracking.cues": "run",
+    "surveillance.active": "check", "surveillance.ads_b": "check",
+    "surveillance.exchange": "", "tracking.cues": "run",
     "tracking.ekf": "check run", "tracking.hold_last": "run", "tracking.imm": "check run",
     "tracking.stonesoup": "run", "tracking.stub": "run", "tracking.ukf": "check run",
     "traffic.asterix": "refused", "traffic.csv": "refused", "traffic.daa_file": "refused",
