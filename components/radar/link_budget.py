@@ -20,9 +20,9 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
+from components.arguments.units import SPEED_OF_LIGHT_M_S
 from components.radar.detection.probability import required_snr
 
-SPEED_OF_LIGHT_M_S = 299_792_458.0
 BOLTZMANN_J_K = 1.380649e-23
 REFERENCE_TEMPERATURE_K = 290.0
 

@@ -35,7 +35,7 @@ from components.radar.link_budget import wavelength
 from components.radar.measurement import OwnVelocity
 from components.radar.parameters import RadarParameters
 from components.radar.rain import RainClutter, SidelobeClutter
-from components.radar.resolution import ONE_REPORT, Merging, OneReportByCell
+from components.radar.resolution import ONE_REPORT, SEEMING_RANGE, Merging, OneReportByCell
 from components.radar.timing import check_unambiguous
 from components.radar.weather import (
     SNR,
@@ -67,7 +67,7 @@ class Radar(SweepingSensor):
     #: Whether a range stands for the link budget; ground then echoes in cells with a size only.
     boundary: ClassVar[bool] = False
     hooks: ClassVar[tuple[Hook[Any], ...]] = (
-        SNR, DOPPLER, RANGE_RATE, ONE_REPORT, CLUTTER, REFERENCE_CELLS,
+        SNR, DOPPLER, RANGE_RATE, ONE_REPORT, CLUTTER, REFERENCE_CELLS, SEEMING_RANGE,
     )  # fmt: skip
 
     effects: ClassVar[tuple[Effect, ...]] = (_RANGE_RATE, _OWN_VELOCITY)
@@ -100,6 +100,11 @@ class Radar(SweepingSensor):
     def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:
         """Return the power of each echo that the radar can tell from others, and 0 of the rest."""
         return power if self._merging is None else self._merging(cells, power)
+
+    def seeming_range_m(self, range_m: FloatArray) -> FloatArray:
+        """Return the ranges that echoes seem to come from, where ranges fold."""
+        seeming: Any = self.built_one(SEEMING_RANGE)
+        return range_m if seeming is None else np.asarray(seeming(np.asarray(range_m)))
 
     def filtered(
         self, cells: Cells, signal: FloatArray, beside: list[FloatArray]

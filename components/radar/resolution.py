@@ -1,16 +1,17 @@
-"""Resolution cells: their size and number, and targets that are one echo in one of them."""
+"""Resolution cells: size and number, targets that are one echo in one, and ranges that fold."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any, Self
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from components.messages.reach import Reach
 from components.radar.detection.output import MOST_CELLS
+from components.radar.pulse_trains.ambiguity import coincident_range_m
 from components.sensor.look import Cells
 from components.sensor.parameters import RangeErrorParameters, SensorParameters
 from dsa_des.arrays.types import FloatArray
@@ -161,7 +162,10 @@ def cells_of_radar(block: Any) -> ResolutionCells:
             f"range_km is {p.range_km:g}: it must be above the minimum range, "
             f"{block.budget.nearest_m / 1000:g} km"
         )
-    return ResolutionCells.filling(block.reach, block.budget.nearest_m, cell_size(p))
+    # Where ranges fold there are no cells beyond.
+    far_m = min(block.reach.range_max_m, p.farthest_report_m)
+    reach = replace(block.reach, range_max_m=far_m)
+    return ResolutionCells.filling(reach, block.budget.nearest_m, cell_size(p))
 
 
 class Merging:
@@ -179,7 +183,9 @@ class Merging:
         seen = block.axes(cells.body_azimuth_rad, cells.body_elevation_rad)
         cell = [
             np.rint(values / width)
-            for values, width in zip((*seen, cells.range_m), self._widths, strict=True)
+            for values, width in zip(
+                (*seen, block.seeming_range_m(cells.range_m)), self._widths, strict=True
+            )
         ]
         # Astern the last cell is the first one.
         astern = np.rint(np.pi / self._widths[0])
@@ -233,3 +239,66 @@ class OneReportByCell(Effect[Merging]):
                 return Verdict(False, f"{p.sizeless_steps[0]} is 0: a cell has no size")
             return Verdict(True, f"errors is '{p.errors}', and resolution_cells not false")
         return Verdict(p.reports_by_cell, f"resolution_cells is {str(p.reports_by_cell).lower()}")
+
+
+class SeemingRange(Protocol):
+    """Gives the ranges that echoes seem to come from."""
+
+    def __call__(self, range_m: FloatArray, /) -> FloatArray:
+        """Return them for true ones, m."""
+
+
+SEEMING_RANGE = Hook("seeming range", SeemingRange, "range that an echo seems to come from, m")
+
+
+class RangeFolding(Effect[SeemingRange]):
+    """Echoes of earlier pulses are taken for those of the last one.
+
+    Of several PRFs those see a target that receive as much of it as the one that decides; the range
+    is where they agree. Echoes of ground and rain fold too: these are left out, and so are ghosts
+    between the echoes of two targets.
+    """
+
+    name = "range folding"
+    acts_on = SEEMING_RANGE
+    outside_the_proof = "without it nothing is seen beyond c / 2PRF"
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``range_folds``, and say which PRFs resolve it."""
+        p = block.p
+        if not p.range_folds:
+            return Verdict(False, "range_folds is false")
+        if not p.other_prfs_hz:
+            return Verdict(True, f"range_folds is true: at {p.farthest_report_m / 1000:.4g} km")
+        count = len(p.prfs_hz)
+        return Verdict(True, f"range_folds is true: {p.prfs_needed or count} of {count} PRFs")
+
+    def build(self, block: Any) -> SeemingRange:
+        """Return what gives the seeming ranges of true ones."""
+        p = block.p
+        if not p.range_folds:
+            return lambda range_m: range_m
+
+        def seeming(range_m: FloatArray) -> FloatArray:
+            shares = p.shares(range_m)
+            return coincident_range_m(
+                range_m,
+                prfs_hz=p.prfs_hz,
+                seen=shares >= p.decisive_share(shares),
+                tolerance_m=0.5 * cell_size(p)[2],
+            )
+
+        return seeming
+
+
+def folded_clutter(block: Any) -> list[str]:
+    """Say that echoes of ground and rain do not fold, where there are some and a target's do."""
+    terrain, weather = (block.context.sections.get(name) for name in ("terrain", "weather"))
+    ground = terrain is not None and terrain.height_m is not None
+    rain = weather is not None and weather.rain_rate_mm_h > 0
+    if not (block.p.range_folds and (ground or rain)):
+        return []
+    return [
+        "range_folds: echoes of ground and rain do not fold, clutter is that of a target's true "
+        "range: over ground nearer than that this radar sees too much"
+    ]

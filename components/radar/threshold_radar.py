@@ -40,9 +40,15 @@ from components.radar.parameters import (
 from components.radar.radar import Radar
 from components.radar.rain import RainClutter, SidelobeClutter
 from components.radar.rcs import MEAN_RCS, AspectRcs, constant_rcs_m2, mean_rcs_m2
-from components.radar.resolution import OneReportByCell
+from components.radar.resolution import OneReportByCell, RangeFolding, folded_clutter
 from components.radar.timing import LOOK_ENERGY, TimeBudget, time_report
-from components.radar.weather import WEATHER_EFFECTS, BlindRange, gas_left_out, rain_warnings
+from components.radar.weather import (
+    WEATHER_EFFECTS,
+    BlindRange,
+    Eclipsing,
+    gas_left_out,
+    rain_warnings,
+)
 from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
 from components.sensor.look import Cells, CellValues, Look, values_of
 from components.sensor.sensor import CUED_INPUTS
@@ -77,6 +83,8 @@ class LinkBudgetRadar(Radar):
         AspectRcs(),
         *WEATHER_EFFECTS,
         BlindRange(),
+        Eclipsing(),
+        RangeFolding(),
         BeamShape(),
         GroundClutter(),
         RainClutter(),
@@ -262,7 +270,7 @@ class LinkBudgetRadar(Radar):
     def left_out(self) -> list[str]:
         """Say what the air would take that the scene leaves out, and where echoes are ambiguous."""
         said = [*super().left_out(), *gas_left_out(self)]
-        if self.p.prf_hz is not None and self.p.range_km is None:
+        if self.p.prf_hz is not None and self.p.range_km is None and not self.p.range_folds:
             range_km = self.stated_reach.range_max_m / 1000.0
             said.append(
                 f"targets beyond {range_km:.4g} km: not looked at, their echoes come after the "
@@ -284,6 +292,7 @@ class LinkBudgetRadar(Radar):
             *beam_against_gain(self.p),
             *rain_warnings(self),
             *gas_left_out(self),
+            *folded_clutter(self),
         ]
 
     def report(self) -> dict[str, Any]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
-from components.messages.reach import Reach
-from components.radar.link_budget import SPEED_OF_LIGHT_M_S
+from components.arguments.units import SPEED_OF_LIGHT_M_S
+from components.radar.pulse_trains.ambiguity import unambiguous_range_m
+from components.radar.pulse_trains.keys import PulseTrainParameters
 from components.radar.resolution import ResolutionParameters, steps_across
 from dsa_des.block.effect import Effect, Hook, Verdict
 
@@ -32,11 +33,6 @@ class BeamPositions(NamedTuple):
 def pulses_in(dwell_s: float, prf_hz: float) -> int:
     """Return the number of whole pulse intervals in a dwell, 0 or more."""
     return math.floor(dwell_s * prf_hz * (1.0 + _ROUNDING))
-
-
-def unambiguous_range_m(prf_hz: float) -> float:
-    """Return the range from beyond which echoes come after the next pulse has left, m."""
-    return SPEED_OF_LIGHT_M_S / (2.0 * prf_hz)
 
 
 def check_unambiguous(prf_hz: float, range_km: float) -> None:
@@ -77,7 +73,7 @@ class LookEnergy:
     summed: int
 
 
-class TimeBudgetParameters(ResolutionParameters):
+class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
     """Parameters of what a radar's scan costs in time."""
 
     budget: Literal["free", "dwell"] | None = Field(
@@ -94,12 +90,6 @@ class TimeBudgetParameters(ResolutionParameters):
         description="Whether a target loses what lies off the beam's axis: that between the "
         "scan's beam positions, and the mean over a sweep. The link budget, and a range that "
         "calibrates it, are of a target amid the beam.",
-    )
-    prf_hz: float | None = Field(
-        default=None,
-        gt=0,
-        description="Pulse repetition frequency, Hz; targets whose echo comes after the next pulse "
-        "are not looked at.",
     )
     dwell_s: float | None = Field(
         default=None,
@@ -189,7 +179,8 @@ class TimeBudgetParameters(ResolutionParameters):
         beams = self.beams
         if self.budget != "dwell" or beams is None:
             return None
-        dwell_s = self._dwell_s(beams)
+        # Each PRF has a dwell of its own.
+        dwell_s = self._dwell_s(beams) / (1 + len(self.other_prfs_hz))
         if self.prf_hz is None or self.stated_pulses is None:
             return LookEnergy(beams, dwell_s, None, dwell_s / (self.dwell_s or dwell_s), 1)
         pulses = pulses_in(dwell_s, self.prf_hz)
@@ -197,17 +188,10 @@ class TimeBudgetParameters(ResolutionParameters):
             return LookEnergy(beams, dwell_s, pulses, 1.0, pulses)
         return LookEnergy(beams, dwell_s, pulses, pulses / self.stated_pulses, 1)
 
-    def reach(self) -> Reach:
-        """Return the reach, which ends where echoes come after the next pulse."""
-        reach = super().reach()
-        if self.prf_hz is None or self.range_km is not None:
-            return reach
-        return replace(reach, range_max_m=unambiguous_range_m(self.prf_hz))
-
     def _check_pulse_interval(self) -> None:
         if self.prf_hz is None:
             return
-        if self.range_km is not None:
+        if self.range_km is not None and not self.range_folds:
             check_unambiguous(self.prf_hz, self.range_km)
         if self.dwell_s is not None and pulses_in(self.dwell_s, self.prf_hz) < 1:
             raise ValueError(
@@ -245,6 +229,8 @@ class TimeBudgetParameters(ResolutionParameters):
         if (least := self._least_dwell_s()) is None:
             return
         least_s, what = least
+        if self.other_prfs_hz:
+            least_s, what = least_s * len(self.prfs_hz), f"{what} at each PRF"
         available_s = self._dwell_s(beams)
         if available_s * (1.0 + 1e-9) < least_s:
             free = "" if self.budget == "dwell" else ", or budget 'free' for a scan without cost"

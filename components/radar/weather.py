@@ -1,10 +1,11 @@
-"""Attenuation of a radar's echo by gas, rain and fog, and the blind range."""
+"""Attenuation of a radar's echo by gas, rain and fog, the blind range, and eclipsing."""
 
 import math
 from typing import Any, ClassVar
 
 import numpy as np
 
+from components.arguments.units import SPEED_OF_LIGHT_M_S
 from components.atmosphere.attenuation import gas_specific_attenuation
 from components.atmosphere.slant_path import (
     AttenuationTable,
@@ -13,7 +14,6 @@ from components.atmosphere.slant_path import (
     two_way_transmission,
 )
 from components.environment.tables import Weather
-from components.radar.link_budget import SPEED_OF_LIGHT_M_S
 from components.radar.rain import HIGHEST_RAYLEIGH_HZ, no_rain_echo
 from components.sensor.look import Cells, CellValues
 from dsa_des.arrays.types import FloatArray
@@ -41,6 +41,35 @@ class BlindRange(Effect[CellValues]):
 
         def factor(cells: Cells) -> FloatArray:
             return np.where(cells.range_m < nearest_m, 0.0, 1.0)
+
+        return factor
+
+
+class Eclipsing(Effect[CellValues]):
+    """No echo is received while a pulse is sent: the SNR is that of the share that is.
+
+    Of several PRFs the one counts by which just enough see the target.
+    """
+
+    name = "eclipsing"
+    acts_on = SNR
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``pulse_width_s``."""
+        width_s = block.p.pulse_width_s
+        if width_s is None:
+            return Verdict(False, "pulse_width_s is not given")
+        return Verdict(True, f"pulse_width_s is {width_s:g}")
+
+    def build(self, block: Any) -> CellValues:
+        """Return the factor on every cell's SNR."""
+        p = block.p
+        if p.pulse_width_s is None:
+            return lambda cells: np.ones(len(cells))
+
+        def factor(cells: Cells) -> FloatArray:
+            decisive: FloatArray = p.decisive_share(p.shares(np.asarray(cells.range_m)))
+            return decisive
 
         return factor
 

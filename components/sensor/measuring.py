@@ -56,6 +56,10 @@ class Measuring(Component):
         """Return the true range rates of some cells, m/s; None where they are not measured."""
         return None
 
+    def seeming_range_m(self, range_m: FloatArray) -> FloatArray:
+        """Return the ranges that targets seem to be at, before errors of measurement."""
+        return range_m
+
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return what `Look.signal` adds to the variances, by quantity, in the sensor's axes."""
         raise TypeError(f"{type(self).__name__} has no signal that errors follow from")
@@ -85,7 +89,7 @@ class Measuring(Component):
             line = azimuth_rad, elevation_rad, range_m
             azimuth_rad, elevation_rad, range_m = self.wander(cells, detected, *line)
         azimuth, elevation = self.axes(azimuth_rad, elevation_rad)
-        true = {"azimuth": azimuth, "elevation": elevation, "range": range_m}
+        true = {"azimuth": azimuth, "elevation": elevation, "range": self.seeming_range_m(range_m)}
         if (rate := self.range_rate(cells, detected)) is not None:
             true["range_rate"] = rate
         return self._in_body(*self._measurement(cells, detected, look, true))

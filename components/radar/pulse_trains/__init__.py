@@ -1,0 +1,1 @@
+"""What follows from a radar's pulses: eclipsing, folded ranges, and several PRFs."""
