@@ -30,8 +30,10 @@ from components.display.symbols import (
     over_time,
     targets_key,
 )
+from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, drawing, figure_text
+from dsa_des.replicas.times_out import times_out_s
 from dsa_des.running.simulation import Simulation
 
 Scans = dict[str, SensorScans]
@@ -81,7 +83,10 @@ def draw_timeline(
         below = figure.add_axes((_LEFT, 0.08, _BELOW, 0.94 - share - 0.08 - 0.15))
         _draw_ranges(below, flights, detected, duration_s, alerted)
         below.axvspan(close_up.start_s, close_up.end_s, color="#000000", alpha=0.12, linewidth=0)
-        below.set_title("Whole run (shaded: the part above)", loc="left")
+        scene = simulation.scene
+        out_s = times_out_s(scene, [scene.seed], np.array([duration_s]))
+        bars = _draw_times_out(below, {n: s for n, (s,) in out_s.items()}, detected.styles)
+        below.set_title(f"Whole run (shaded: the part above{bars})", loc="left")
     return path
 
 
@@ -201,6 +206,18 @@ def _draw_scans(
         handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False,
         borderaxespad=0.1,
     )  # fmt: skip
+
+
+def _draw_times_out(axes: Any, out_s: Mapping[str, FloatArray], styles: Mapping[str, Mark]) -> str:
+    """Draw a bar at the foot wherever a sensor was out, and return what the title says of it."""
+    failed = [name for name in styles if len(out_s.get(name, ()))]
+    for number, name in enumerate(failed):
+        from_s, to_s = out_s[name].T
+        axes.broken_barh(
+            np.column_stack((from_s, to_s - from_s)), (0.005 + 0.025 * number, 0.02),
+            color=styles[name].colour, transform=axes.get_xaxis_transform(), zorder=4.0, label=name,
+        )  # fmt: skip
+    return f"; bars: {', '.join(figure_text(name, 16) for name in failed)} out" if failed else ""
 
 
 def _mark_size(count: int) -> float:

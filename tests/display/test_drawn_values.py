@@ -7,6 +7,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pymap3d
 import pytest
+from click.testing import CliRunner
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
@@ -20,6 +21,7 @@ from components.display.report import DetectAndSenseReport
 from components.messages.reach import Reach
 from components.sensor.marks import EO, RADAR
 from components.sensor.mounting import SensorAxes
+from dsa_des.cli import main
 from dsa_des.record.arrow import ParquetSink
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ObserverSink
@@ -503,3 +505,17 @@ def test_a_field_of_view_all_around_is_a_ring_without_a_corner_at_the_ownship():
     assert np.hypot(*corners.T) == pytest.approx(5.0)
     most = Reach((-math.radians(170), math.radians(170)), (-1.0, 1.0), 5000.0)
     assert outline_of(1.0, most, SensorAxes()).corners_km[-1] == pytest.approx((0.0, 0.0))
+
+
+def test_bars_show_when_sensors_were_out(tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr(
+        FigureCanvasAgg, "print_png", lambda canvas, *_, **__: figures.append(canvas.figure)
+    )
+    words = ["run", "radar_outage", "--out", str(tmp_path / "run"), "--quiet"]
+    assert CliRunner().invoke(main, words).exit_code == 0  # off from 30 s to 50 s
+    below = figures[-1].axes[1]
+    bars = {of.get_label(): of.get_paths() for of in below.collections if of.get_label() == "radar"}
+    (bar,) = bars["radar"]
+    assert bar.vertices[:, 0].min() == 30 and bar.vertices[:, 0].max() == 50
+    assert "bars: radar out" in below.get_title(loc="left")

@@ -54,10 +54,6 @@ def agreed(true_m: float, prfs_hz: list[float], tolerance_m: float) -> float:
         candidate += step
 
 
-def true_ranges(**keys) -> dict[str, float]:
-    return {row["target"]: row["true_range_m"] for row in rows(alone("radar.threshold", **keys))}
-
-
 @pytest.mark.parametrize("duty", [Fraction(1, 10), Fraction(1, 2), Fraction(4, 5)])
 def test_the_share_received_is_what_no_pulse_overlaps(duty):
     interval, width = Fraction(1, 10_000), duty / 10_000
@@ -178,6 +174,17 @@ def test_several_prfs_agree_on_the_true_range_or_a_ghost(kind, needed):
         range_m = agreed(exact["true_range_m"], seeing, 0.5 * cell_m)
         assert row["range_m"] == pytest.approx(range_m, abs=0.51)
         assert row["true_range_m"] == exact["true_range_m"]
+
+
+@pytest.mark.parametrize(("cell_m", "folds"), [(10.0, 0), (30.0, 1), (50.0, 2)])
+def test_ranges_of_two_prfs_agree_within_half_a_cell(cell_m, folds):
+    """Of 700 and 710 m: one fold is 10 m apart, two 20 m."""
+    keys = {"prf_hz": C / 1400.0, "other_prfs_hz": [C / 1420.0], "range_km": 20.0,
+            "range_folds": True, **GRID, "range_cell_m": cell_m}  # fmt: skip
+    found = rows(alone("radar.threshold", **keys))
+    assert len(found) == 2
+    for row in found:
+        assert row["range_m"] == pytest.approx(row["true_range_m"] - 700.0 * folds, abs=0.51)
 
 
 def test_targets_a_fold_apart_are_one_report():
