@@ -17,7 +17,7 @@ from components.messages.state_tracks import (
     StateTracks,
     full_covariance,
 )
-from components.messages.steering import Manoeuvre, Manoeuvres
+from components.messages.steering import Manoeuvres
 from components.messages.tracks import Tracks
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message
@@ -88,9 +88,9 @@ def answered(
 
 
 def _manoeuvres(numbers: Mapping[str, Any], tick: IntArray, count: int) -> Manoeuvres:
-    known = [column for column in Manoeuvre._fields if column in numbers]
+    known = [column for column in Manoeuvres.parts() if column in numbers]
     told = Manoeuvres(np.repeat(tick, count), **{column: numbers[column] for column in known})
-    if not all(np.isfinite(getattr(told, column)).all() for column in Manoeuvre._fields):
+    if not all(np.isfinite(getattr(told, column)).all() for column in Manoeuvres.parts()):
         raise ValueError("finite numbers are needed")
     return told
 

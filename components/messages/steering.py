@@ -114,7 +114,7 @@ class Manoeuvres(Message):
     def __post_init__(self) -> None:
         """Fill in what is not changed."""
         super().__post_init__()
-        for name in self._given()[2:]:
+        for name in self.parts()[2:]:
             if getattr(self, name) is None:
                 setattr(self, name, np.zeros(len(self.tick)))
 
@@ -124,17 +124,17 @@ class Manoeuvres(Message):
         parts = np.array(manoeuvres, dtype=np.float64).reshape(-1, len(Manoeuvre._fields)).T
         given: dict[str, Any] = dict(zip(Manoeuvre._fields, parts, strict=True))
         return cls(
-            np.array(ticks, dtype=np.int64), **{name: given[name].copy() for name in cls._given()}
+            np.array(ticks, dtype=np.int64), **{name: given[name].copy() for name in cls.parts()}
         )
 
     @classmethod
-    def _given(cls) -> list[str]:
+    def parts(cls) -> list[str]:
         """Return which parts of a `Manoeuvre` it holds."""
         return [name for name in Manoeuvre._fields if name in cls.__dataclass_fields__]
 
     def manoeuvres(self) -> FloatArray:
         """Return a row (fields of `Manoeuvre`,) of each row."""
-        none, given = np.full(len(self.tick), math.nan), self._given()
+        none, given = np.full(len(self.tick), math.nan), self.parts()
         parts = [getattr(self, name) if name in given else none for name in Manoeuvre._fields]
         return np.stack(parts, axis=-1)
 

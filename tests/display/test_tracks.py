@@ -89,6 +89,7 @@ def test_compared_trackers_have_their_own_means(tmp_path, monkeypatch, shown):
         replace(shown.tracks[0], block="honest"),
         replace(shown.tracks[0], block="sure", columns=shown.tracks[0].columns | sure),
     ]
+    two.seen_by = dict.fromkeys(two.blocks, shown.seen_by[shown.tracks[0].block])
     figure = drawn_figure(monkeypatch, draw_consistency, tmp_path / "x.png", two)
     errors, innovations = figure.axes
     assert "mean" not in errors.get_title(loc="left") + innovations.get_title(loc="left")

@@ -12,7 +12,7 @@ from components.foreign.fmu.detections import DetectionOutputs
 from components.foreign.fmu.model import TEXT_KINDS, FmuModel, PartitionClock, Variable
 from components.foreign.fmu.start_values import first_inputs, size_of, start_value
 from components.foreign.fmu.units import unit_of_column
-from components.messages.steering import Manoeuvre
+from components.messages.steering import Manoeuvres
 from dsa_des.errors import did_you_mean
 
 _OWNSHIP = ("own_lat_deg", "own_lon_deg", "own_alt_m", "own_yaw_rad", "own_pitch_rad",
@@ -53,7 +53,7 @@ class Wiring:
         self._read_outputs()
         self._read_inputs()
         self._read_clocks()
-        for key, known in (("ownship", _OWNSHIP), ("manoeuvre", Manoeuvre._fields)):
+        for key, known in (("ownship", _OWNSHIP), ("manoeuvre", Manoeuvres.parts())):
             self._read_fields(key, getattr(p, key), known)
         self.detections = DetectionOutputs(p.detections, p.targets, self)
         self.wrong += self.detections.wrong
