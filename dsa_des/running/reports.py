@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from dsa_des.block.component import RunEnd
 from dsa_des.block.entry_points import registered
 from dsa_des.block.foreign import installed
 from dsa_des.record.run_folder import REPORTS
@@ -76,7 +77,8 @@ def _in_vain(simulation: Simulation) -> Iterator[str]:
     for name, component in simulation.components.items():
         sources = [*graph.predecessors(name)]
         if component.outputs and not graph.out_degree(name):
-            if not any(message.recorded for message in component.records()):
+            ends = any(issubclass(output.message, RunEnd) for output in component.outputs.values())
+            if not ends and not any(message.recorded for message in component.records()):
                 yield f"blocks.{name}: what it sends goes nowhere: no wire begins at it"
         elif sources and all(simulation.components[of].platforms() for of in sources):
             mine = scene.blocks[name]

@@ -258,8 +258,9 @@ def tracks_drawn(folder, groups):
             if number == 1:  # a short one, of two rows
                 columns["track"][7:9] = 4
             writer.write_table(pa.table([columns[name] for name in schema.names], schema=schema))
+    tracker = SimpleNamespace(context=SimpleNamespace(platform="ownship"))
     tracemalloc.start()
-    found = tracks.DrawnTracks.read(SimpleNamespace(components={}), folder)
+    found = tracks.DrawnTracks.read(SimpleNamespace(components={"tracker": tracker}), folder)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     counts = {one.number: len(one.columns["state_s"]) for one in found.tracks}
