@@ -50,8 +50,10 @@ ENDS_S = {
     "tracking/flown_intercept.toml": 20,
     "tracking/one_target.toml": 30,
 }
-#: Perfect surveillance has no sensor; the pilot of one encounter finds nobody in its time.
+#: Perfect surveillance and exchanged positions have no sensor; the pilot of one encounter finds nobody in its time.
 UNSEEN = {
+    "platforms/fleet.toml",
+    "platforms/velocities.toml",
     "published/degas.toml",
     "published/degas_unmitigated.toml",
     "published/see_and_avoid.toml",
