@@ -50,7 +50,8 @@ ENDS_S = {
     "tracking/flown_intercept.toml": 20,
     "tracking/one_target.toml": 30,
 }
-#: Perfect surveillance and exchanged positions have no sensor; the pilot of one encounter finds nobody in its time.
+#: Perfect surveillance and exchanged positions have no sensor; the pilot of one encounter finds
+#: nobody in its time.
 UNSEEN = {
     "platforms/fleet.toml",
     "platforms/velocities.toml",
