@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.flights.many_flights import SteeredFlight
+from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.steering import Manoeuvre
@@ -263,3 +263,37 @@ def test_a_turn_that_a_climb_meets_ends_where_it_would_have_ended():
     for found in flown_as_steered([STRAIGHT] * 2, [commands, commands]):
         for got, expected in zip(found.at(times).arrays(), alone.at(times).arrays(), strict=True):
             assert np.array_equal(got, expected)
+
+
+def test_fleets_that_grew_out_of_one_each_keep_their_own_manoeuvres():
+    """A run that goes back steers anew from a fleet that was steered on already."""
+    runs, times = np.arange(3), np.arange(0.0, 40.0, 0.5)
+    fleet = SteeredFleet(fleet_of([STRAIGHT] * 3))
+    first = fleet
+    for at_s in (5.0, 7.0, 9.0):
+        first = first.steered(runs, np.full(3, at_s), [Manoeuvre(0.1 * k, 0.05) for k in (1, 2, 3)])
+
+    def ways(fleet):
+        return np.array([fleet[run].at(times).lat_deg for run in runs.tolist()])
+
+    before = ways(first)
+    both = [
+        first.steered(np.array(who), np.full(len(who), at_s), [Manoeuvre(turn, 0.05)] * len(who))
+        for who, at_s, turn in (([0, 2], 20.0, 0.5), ([0, 1], 15.0, -0.7))
+    ]
+    assert np.array_equal(ways(first), before)
+    for fleet, (who, at_s, turn) in zip(
+        both, (([0, 2], 20.0, 0.5), ([0, 1], 15.0, -0.7)), strict=True
+    ):
+        for run in runs.tolist():
+            alone = SteeredFlight(STRAIGHT)
+            for before_s in (5.0, 7.0, 9.0):
+                alone = alone.steered(before_s, Manoeuvre(0.1 * (run + 1), 0.05))
+            if run in who:
+                alone = alone.steered(at_s, Manoeuvre(turn, 0.05))
+            assert np.array_equal(ways(fleet)[run], alone.at(times).lat_deg)
+            # As many as count: by the first ones only, or by none.
+            for known in (0, 3):
+                got = fleet.each(np.full(len(times), run), times, np.full(len(times), known))
+                expected = before[run] if known else STRAIGHT.at(times).lat_deg
+                assert np.array_equal(got.lat_deg, expected)
