@@ -30,8 +30,8 @@ class Outage(Parameters):
     )
     stuck: dict[str, float] = Field(
         default={},
-        description="Of a stuck bit: the quantity, range_m or azimuth_deg, and what the bit is "
-        "worth, such as { range_m = 1024 }.",
+        description="Of a stuck bit: the quantity, as the sensor's message has it, and what the "
+        "bit is worth in its unit.",
     )
 
     @property
@@ -55,7 +55,7 @@ class Outage(Parameters):
         if (self.mode == "stuck_bit") != bool(self.stuck):
             raise ValueError(
                 f"mode is {self.mode!r} and stuck is {self.stuck}: the one asks for the other, "
-                "as in mode = 'stuck_bit', stuck = { range_m = 1024 }"
+                "mode = 'stuck_bit', stuck = { QUANTITY = WORTH }"
             )
         if wrong := [name for name, worth in self.stuck.items() if worth <= 0.0]:
             raise ValueError(f"stuck.{wrong[0]} must be greater than 0, what the bit is worth")

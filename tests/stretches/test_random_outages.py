@@ -177,7 +177,7 @@ def test_wrong_outages_are_said():
         (outage("radar", mean_between_s=1e-5), "at most 100,000 failures"),
         (outage("radar", every_s=3), "every_s"),
         (outage("radar", mode="dead"), "'frozen'"),
-        (outage("radar", mode="stuck_bit"), "stuck = { range_m = 1024 }"),
+        (outage("radar", mode="stuck_bit"), "stuck = { QUANTITY = WORTH }"),
         (outage("radar", stuck={"range_m": 8}), "the one asks for the other"),
         (outage("radar", mode="stuck_bit", stuck={"range": 8}), "did you mean 'range_m'?"),
         (outage("radar", mode="stuck_bit", stuck={"range_m": 0}), "must be greater than 0"),
