@@ -139,7 +139,8 @@ class PositionExchange(Component):
         roster = roster if viewer < 0 else roster.seen_from(viewer)
         keys = np.append(target_keys((roster.own_name,)), roster.keys_of(states.columns))
         keys = np.broadcast_to(keys, here.shape[1:])
-        return _way(here, there) / _STEP_S, *self._fix_errors(wake, keys)
+        position_errors, velocity_errors = self._fix_errors(wake, keys)
+        return _way(here, there) / _STEP_S, position_errors, velocity_errors
 
     def _fix_errors(self, wake: Wake, keys: AnyArray) -> list[FloatArray]:
         """Return errors of position and of velocity, (2, rows, aircraft) each: east and north."""

@@ -71,10 +71,10 @@ class View:
         """
         every, lasts_s, one_run = np.arange(self._width), self.look.lasts_s, len(flown.own) == 1
         if self.epochs is not None:
-            own, near = self.epochs.near(flown.platforms[self.viewer], run, time_s)
+            state, near = self.epochs.near(flown.platforms[self.viewer], run, time_s)
             near[:, self._steered] = True
             columns = np.flatnonzero(near.any(axis=0)) if one_run else every
-            return self._own(flown, run, time_s, own), columns, near[:, columns]
+            return self._own(flown, run, time_s, state), columns, near[:, columns]
         own = self._own(flown, run, time_s)
         if self.intervals is None:
             return own, every, None
