@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from math import atan2, cos, inf, isnan, radians
 from typing import Any
 
@@ -132,6 +133,20 @@ class SteeredFleet(Growing, Fleet):
         flown = (self._flown[n] or self._parts[n] for n in numbers.tolist())
         return tuple(zip(starts_s.tolist(), flown, strict=True))
 
+    def subset(self, columns: IntArray) -> SteeredFleet:
+        """Return the fleet of some flights, in any order, without preparing them anew."""
+        if np.array_equal(columns, np.arange(len(self))):
+            return self
+        flights = self._flights
+        if isinstance(flights, ScriptedFleet):
+            some = SteeredFleet(flights.subset(columns))
+        else:
+            some = SteeredFleet(fleet_of([flights[number] for number in columns.tolist()]))
+        some._parts, some._flown = self._parts, self._flown
+        for name in ("manoeuvre_count", "_start_s", "_part"):
+            setattr(some, name, getattr(self, name)[columns])
+        return some
+
     def each(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
     ) -> TrajectoryState:
@@ -174,10 +189,11 @@ class SteeredFleet(Growing, Fleet):
         own = _NOBODY if len(after) == len(part) else np.flatnonzero(part == 0)
         return own, after, self._part[aircraft[after], part[after] - 1]
 
-    @property
+    @cached_property
     def max_speeds_mps(self) -> FloatArray:
         """Largest speed of each along its path as it is now, shape (flights,)."""
-        return np.array([flight.max_speed_mps for flight in self], dtype=np.float64)
+        every = np.arange(len(self))
+        return np.maximum(self._flights.max_speeds_mps, self.fastest_by(every, every + np.inf))
 
     def ground_speeds_mps(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
@@ -282,6 +298,7 @@ class SteeredFleet(Growing, Fleet):
     ) -> SteeredFleet:
         """Return the flights with a new part of each of some ownships from times on."""
         fleet = self.with_more(_flown=np.array(flown, dtype=object))
+        fleet.__dict__.pop("max_speeds_mps", None)
         fleet._parts = self._parts.with_flights(new)
         index = self.manoeuvre_count[ownship]
         wide = self._start_s.shape[1]
@@ -325,7 +342,7 @@ class SteeredFlight:
     @property
     def max_speed_mps(self) -> float:
         """Largest speed along the path as it is now."""
-        return max(flight.max_speed_mps for flight in (self.flight, *(f for _, f in self.parts)))
+        return float(self._fleet.max_speeds_mps[self._number])
 
     def interval_present(self) -> tuple[float, float]:
         """Return from when to when it is there: from 0 on, as what is flown has no end."""
@@ -399,6 +416,9 @@ class MixedFleet(Fleet):
 
 
 def _steered(flights: Sequence[SteeredFlight]) -> SteeredFleet:
+    fleet = flights[0]._fleet
+    if all(flight._fleet is fleet for flight in flights):
+        return fleet.subset(np.array([flight._number for flight in flights]))
     return SteeredFleet(fleet_of([f.flight for f in flights]), [f.parts for f in flights])
 
 

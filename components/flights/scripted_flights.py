@@ -216,7 +216,7 @@ class ScriptedFleet(Growing, Fleet):
             _columns=flights._columns + len(self._names),
             **{name: getattr(flights, name) for name in _GROWING},
         )
-        fleet.__dict__.pop("_parts", None)
+        fleet._forget()
         fleet._find = self._find.with_paths(flights._find)
         fleet._some_fixed = self._some_fixed or flights._some_fixed
         fleet._tables = {**flights._tables, **self._tables}
@@ -224,6 +224,11 @@ class ScriptedFleet(Growing, Fleet):
             more = flights._tables[kind].values
             fleet._tables[kind] = self._tables[kind].with_more(more)
         return fleet
+
+    def _forget(self) -> None:
+        """Forget what is worked out of all flights: they are others now."""
+        for name in ("_parts", "max_speeds_mps"):
+            self.__dict__.pop(name, None)
 
     def _table(self, kind: int, slot: IntArray) -> FloatArray:
         """Return the table (rows, n) of legs of a kind."""
@@ -244,7 +249,7 @@ class ScriptedFleet(Growing, Fleet):
     def subset(self, columns: IntArray) -> ScriptedFleet:
         """Return the fleet of some flights, without preparing them anew."""
         fleet = copy(self)
-        fleet.__dict__.pop("_parts", None)
+        fleet._forget()
         fleet._columns = self._columns[columns]
         return fleet
 
@@ -264,7 +269,7 @@ class ScriptedFleet(Growing, Fleet):
         between_s = self._between_s[:, number].tolist()
         return ScriptedTrajectory.of_segments(self._names[number], segments, fixed, *between_s)
 
-    @property
+    @cached_property
     def max_speeds_mps(self) -> FloatArray:
         """Largest speed of each along its path, shape (flights,)."""
         if not len(self._names):

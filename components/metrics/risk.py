@@ -40,6 +40,11 @@ _FINER = 50
 class RiskParameters(SizeParameters):
     """What counts as a loss of well clear, and as a near mid-air collision, and how it is found."""
 
+    platform: str | None = Field(
+        default=None,
+        description="Name of the aircraft from which the others are seen, by default the ownship; "
+        "'*' for events between any two.",
+    )
     step_s: float | None = STEP
 
 
@@ -47,6 +52,7 @@ class Mitigated(FlownMetric):
     """Events with and without the manoeuvres that the ownship was told to fly."""
 
     Parameters = RiskParameters
+    of_any_two = True
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
