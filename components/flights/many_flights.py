@@ -193,7 +193,9 @@ class SteeredFleet(Growing, Fleet):
     def max_speeds_mps(self) -> FloatArray:
         """Largest speed of each along its path as it is now, shape (flights,)."""
         every = np.arange(len(self))
-        return np.maximum(self._flights.max_speeds_mps, self.fastest_by(every, every + np.inf))
+        return np.maximum(
+            self._flights.max_speeds_mps, self.fastest_by(every, np.full(len(self), inf))
+        )
 
     def ground_speeds_mps(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None

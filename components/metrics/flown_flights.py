@@ -47,7 +47,9 @@ class Told(NamedTuple):
 
     def take(self, which: slice | IntArray | BoolArray) -> "Told":
         """Return some of them."""
-        return Told(*(part[which] for part in self))
+        return Told(
+            self.told_s[which], self.came_s[which], self.steered[which], self.manoeuvre[which]
+        )
 
     def of(self, platform: int) -> "Told":
         """Return those that steer one aircraft."""
