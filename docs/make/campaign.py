@@ -1,7 +1,7 @@
-"""``python -m docs.make.campaign FOLDER ...``: losses beside the published ones, of docs/platforms.md.
+"""``python -m docs.make.campaign FOLDER ...``: the table of losses of docs/platforms.md.
 
-Folders are those of ``dsa-des study velocity_pairs`` and ``velocity_rings``, also with fewer cells, or
-stopped before their end: what is there of a cell counts together.
+Folders are those of ``dsa-des study velocity_pairs`` and ``velocity_rings``, also with fewer cells
+or stopped before their end: what is there of a cell counts together.
 """
 
 import argparse
@@ -48,9 +48,9 @@ def counted(folders: Iterable[Path]) -> dict[tuple[str, int], tuple[int, int]]:
 def rows(folders: Iterable[Path]) -> list[str]:
     """Return the lines of the table, pairs first."""
     lines = [
-        "| cell | error, m | lost | of runs | probability, 95 % | published, 95 % | each in the other's |",
+        "| cell | error, m | lost | of runs | probability, 95 % | published | in each other's |",
         "|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
+    ]
     for cell, (events, runs) in sorted(counted(folders).items()):
         ours = _between(events, runs)
         theirs, agree = "", ""
