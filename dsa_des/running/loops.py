@@ -87,15 +87,19 @@ def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> 
     """Return the place of each block in the order in which blocks tell each other what they offer.
 
     Requests go the other way. Both pass over wires with and without delay; loops are opened where
-    an input can be done without, and else at a delay.
+    an input can be done without, first of blocks that need none at all, and else at a delay.
     """
-    looped = in_cycles(graph)
     opened = nx.DiGraph(graph)
-    opened.remove_edges_from(
-        edge
-        for edge in graph.edges
-        if edge[0] in looped
-        and looped[edge[0]] == looped.get(edge[1])
-        and _optional(graph, classes, edge)
-    )
+    for every in (False, True):
+        looped = in_cycles(opened)
+        opened.remove_edges_from(
+            [
+                edge
+                for edge in opened.edges
+                if edge[0] in looped
+                and looped[edge[0]] == looped.get(edge[1])
+                and _optional(graph, classes, edge)
+                and (every or not any(i.required for i in classes[edge[1]].inputs.values()))
+            ]
+        )
     return window_order(opened, set(graph), cut_loops(opened, classes))
