@@ -131,13 +131,18 @@ def _unzipped(problems: Problems, data: bytes) -> bytes:
         return data
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            inside = [one for one in archive.infolist() if not one.is_dir()]
+            inside = [
+                one for one in archive.infolist()
+                if not one.is_dir() and not one.filename.startswith("__MACOSX/")
+            ]  # fmt: skip
             first = [one for one in inside if one.filename.lower().endswith(".kml")] or inside
             if len(first) != 1 and first is inside:
                 problems.fail(f"is an archive of {len(inside)} files: give them one by one")
             if first[0].file_size > LARGEST_BYTES:
                 problems.fail(f"holds more than {LARGEST_BYTES / 2**20:,.0f} MB")
             return archive.read(first[0])
+    except TrafficFileError:
+        raise
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, EOFError) as error:
         problems.fail(f"the archive is damaged ({error})")
     except Exception as error:  # of the packing inside
