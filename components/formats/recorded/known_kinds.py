@@ -51,6 +51,7 @@ _OTHERS = (
     (b"SQLite format 3", "is an SQLite database: save its table as CSV"),
     (b"\x89PNG", "is a picture"),
     (b"%PDF", "is a PDF"),
+    (b"# labels_initial", "is an encounter model: dsa-des encounters generate --model samples it"),
 )  # fmt: skip
 
 
