@@ -164,7 +164,7 @@ class FlownMetric(TargetMetric):
         rows = rows[np.lexsort((came_s[rows], replica[rows]))]
         result = {}
         numbers, first = np.unique(replica[rows], return_index=True)
-        for number, mine in zip(numbers.tolist(), np.split(rows, first[1:]), strict=True):
+        for number, mine in zip(numbers.tolist(), np.split(rows, first)[1:], strict=True):
             told = every.take(mine)
             result[number] = told._replace(told_s=np.maximum.accumulate(told.told_s))
         return result

@@ -1,19 +1,9 @@
-"""``python -m docs.make.campaign FOLDER ...``: the table of losses of docs/platforms.md.
+"""Losses of separation beside published ones, from the runs of the two studies of velocities."""
 
-Folders are those of ``dsa-des study velocity_pairs`` and ``velocity_rings``, also with fewer cells
-or stopped before their end: what is there of a cell counts together.
-"""
-
-import argparse
-import sys
-from collections.abc import Iterable
-from pathlib import Path
-
-import pandas as pd  # type: ignore[import-untyped]
+from collections.abc import Sequence
+from typing import Any
 
 from dsa_des.results.statistics import wilson
-from dsa_des.terminal.interruption import plain_ending
-from dsa_des.terminal.terminal import say
 
 #: Events and runs by plain counting in github.com/fazlurnu/OpenCDaRR (MIT), scripts/validation, of
 #: pairs by crossing angle and of rings by number, and the errors of positions, m.
@@ -31,11 +21,10 @@ _AXES = {"crossing_deg": "pair, {}°", "aircraft": "ring of {}"}
 _CONFIDENCE = 0.95
 
 
-def counted(folders: Iterable[Path]) -> dict[tuple[str, int], tuple[int, int]]:
-    """Return events and runs of each cell of some studies' folders."""
+def counted(studies: Sequence[Any]) -> dict[tuple[str, int], tuple[int, int]]:
+    """Return events and runs of each cell of some studies."""
     found: dict[tuple[str, int], tuple[int, int]] = {}
-    for folder in folders:
-        runs = pd.read_parquet(folder / "parts")
+    for runs in studies:
         axis = next(name for name in _AXES if name in runs)
         for (value, error_m), mine in runs.groupby([axis, "error_m"]):
             cell = _AXES[axis].format(int(value)), int(error_m)
@@ -45,13 +34,13 @@ def counted(folders: Iterable[Path]) -> dict[tuple[str, int], tuple[int, int]]:
     return found
 
 
-def rows(folders: Iterable[Path]) -> list[str]:
+def rows(studies: Sequence[Any]) -> list[str]:
     """Return the lines of the table, pairs first."""
     lines = [
         "| cell | error, m | lost | of runs | probability, 95 % | published | in each other's |",
         "|---|---|---|---|---|---|---|",
     ]
-    for cell, (events, runs) in sorted(counted(folders).items()):
+    for cell, (events, runs) in sorted(counted(studies).items()):
         ours = _between(events, runs)
         theirs, agree = "", ""
         if cell in PUBLISHED:
@@ -73,20 +62,3 @@ def _between(events: int, runs: int) -> tuple[float, float, float]:
 def _words(between: tuple[float, float, float]) -> str:
     value, low, high = (f"{of:.2e}".replace("e-0", "e-") for of in between)
     return f"{value} ({low} to {high})"
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Run the command and return its exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m docs.make.campaign",
-        description="Print the table of losses beside the published ones.",
-    )
-    parser.add_argument("folders", type=Path, nargs="+", help="of the two studies")
-    for line in rows(parser.parse_args(arguments).folders):
-        say(line)
-    return 0
-
-
-if __name__ == "__main__":
-    with plain_ending():
-        sys.exit(main())
