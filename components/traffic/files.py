@@ -14,7 +14,12 @@ from components.formats.daa_file import read_daa
 from components.formats.recorded.traffic_of_files import TrafficChoice, read_traffic
 from components.formats.sample_columns import Altitude
 from components.formats.text_rows import TrafficFile
-from components.traffic.recorded import FileParameters, RecordedTraffic, RecordedTrafficParameters
+from components.traffic.recorded import (
+    FileHeights,
+    FileParameters,
+    RecordedTraffic,
+    RecordedTrafficParameters,
+)
 from components.traffic.scripted import Ownship, flight_of
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.files.input_files import is_folder, read_once
@@ -55,7 +60,7 @@ class Moved(Parameters):
     up_m: float = Field(default=0.0, description="Up, m.")
 
 
-class FileTrafficParameters(RecordedTrafficParameters):
+class FileTrafficParameters(RecordedTrafficParameters, FileHeights):
     """Parameters of recorded traffic of any kind."""
 
     file: ScenePath | list[ScenePath] = Field(
@@ -184,7 +189,7 @@ class FileTraffic(RecordedTraffic):
         return f"{first} and {len(others)} more" if others else str(first)
 
 
-class DaaFileParameters(FileParameters):
+class DaaFileParameters(FileParameters, FileHeights):
     """Parameters of a DAIDALUS traffic file."""
 
     reference_lat_deg: float = Field(
