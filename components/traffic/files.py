@@ -60,6 +60,14 @@ class Moved(Parameters):
     up_m: float = Field(default=0.0, description="Up, m.")
 
 
+class Place(Parameters):
+    """Where something stands."""
+
+    lat_deg: float = Field(ge=-90, le=90, description="Latitude, deg.")
+    lon_deg: float = Field(ge=-360, le=360, description="Longitude, deg.")
+    alt_m: float = Field(default=0.0, description="Altitude, m.")
+
+
 class FileTrafficParameters(RecordedTrafficParameters, FileHeights):
     """Parameters of recorded traffic of any kind."""
 
@@ -75,6 +83,11 @@ class FileTrafficParameters(RecordedTrafficParameters, FileHeights):
         description="Which altitude is read, of a file with both. By default of tables the column "
         "that the list of names has first, else the barometric one; aircraft that report none of "
         "that kind fly at the other, as a note says.",
+    )
+    place: Place | None = Field(
+        default=None,
+        description="Where radars are whose plots are flown and that do not say it (ASTERIX 048), "
+        "and the origin of an .xyz file.",
     )
     own_file: ScenePath | None = Field(
         default=None,
@@ -141,8 +154,9 @@ class FileTrafficParameters(RecordedTrafficParameters, FileHeights):
     def choice(self) -> TrafficChoice:
         """Return what is taken of the files."""
         lowest, highest = self.lowest_m, self.highest_m
-        offset = self.own_moved
+        offset, place = self.own_moved, self.place
         return TrafficChoice(
+            place=None if place is None else (place.lat_deg, place.lon_deg, place.alt_m),
             ownship=self.ownship,
             altitude=self.altitude,
             own_file=self.own_file,
