@@ -164,13 +164,13 @@ def _of_plots(
             f"none of its {len(plots)} plots of radars (048) says whose it is and how high: "
             "sensor.recorded takes them as detections"
         )
-    places = {}
+    places: dict[str, tuple[float, float, float]] = {}
     for one in records:
         if one.category == SERVICE and {"lat_deg", "lon_deg", "alt_m"} <= one.values.keys():
-            at = tuple(one.values[name] for name in ("lat_deg", "lon_deg", "alt_m"))
-            places.setdefault(_source(one), at)
-    first: dict[tuple[object, ...], str] = {}
-    reports = []
+            lat_deg, lon_deg, alt_m = (one.values[name] for name in ("lat_deg", "lon_deg", "alt_m"))
+            places.setdefault(_source(one), (lat_deg, lon_deg, alt_m))
+    first: dict[int, str] = {}
+    kept, at = [], []
     for one in seen:
         values, source = dict(one.values), _source(one)
         radar = places.get(source, place)
@@ -183,21 +183,24 @@ def _of_plots(
         category = ADS_B if "number" in values else SYSTEM_TRACKS
         if category == SYSTEM_TRACKS and "track" in values:
             values["number"] = values["track"]
-        elif category == SYSTEM_TRACKS:
-            values |= {"number": values["code"], "name": f"A{values['code']:04o}"}
-        elif first.setdefault((values["number"],), source) != source:
+        elif category == SYSTEM_TRACKS:  # beyond the numbers of tracks
+            values |= {"number": 4096 + values["code"], "name": f"A{values['code']:04o}"}
+        elif first.setdefault(values["number"], source) != source:
             continue
         high_m = values.get("flight_level_m", values.get("alt_m"))
-        azimuth = np.radians([values["azimuth_deg"]])
-        far_m, lat_deg, alt_m = (np.array([v]) for v in (values["range_m"], radar[0], radar[2]))
-        up = _elevations(azimuth, far_m, np.array([high_m]), lat_deg, alt_m)
-        level_m = far_m * np.cos(up)
-        lat, lon, _ = enu_to_geodetic(
-            level_m * np.sin(azimuth), level_m * np.cos(azimuth), far_m * np.sin(up),
-            reference_lat_deg=radar[0], reference_lon_deg=radar[1], reference_alt_m=radar[2],
-        )  # fmt: skip
-        values |= {"lat_deg": float(lat[0]), "lon_deg": float(lon[0])}
-        reports.append(AsterixRecord(category, one.time_s, values))
+        at.append((np.radians(values["azimuth_deg"]), values["range_m"], high_m, *radar))
+        kept.append(AsterixRecord(category, one.time_s, values))
+    azimuth, far_m, high, lat, lon, alt = np.array(at, float).reshape(-1, 6).T
+    up = _elevations(azimuth, far_m, high, lat, alt)
+    level_m = far_m * np.cos(up)
+    there = enu_to_geodetic(
+        level_m * np.sin(azimuth), level_m * np.cos(azimuth), far_m * np.sin(up),
+        reference_lat_deg=lat, reference_lon_deg=lon, reference_alt_m=alt,
+    )  # fmt: skip
+    reports = [
+        one._replace(values={**one.values, "lat_deg": float(lat_deg), "lon_deg": float(lon_deg)})
+        for one, lat_deg, lon_deg in zip(kept, *there[:2], strict=True)
+    ]
     if len(reports) < len(plots):
         said = "do not say whose they are or how high, or are of aircraft that another radar sees"
         warnings.append(f"{len(plots) - len(reports)} plots are left out that {said}")
