@@ -105,6 +105,32 @@ def test_the_preferred_side_changes_late():
     assert sides == [True, True, False]
 
 
+def test_a_side_without_a_way_is_not_preferred():
+    memory = ResolutionMemory(VALUES, "vs")
+    nan, sides = math.nan, []
+    ways = [(-4, 3), (-4, nan), (nan, 3), (-4, nan), (nan, nan), (-4, 3), (-3, 4)]
+    for now_s, (low, high) in enumerate(ways):
+        found = Resolution(float(low), float(high), False)
+        sides.append(memory.step(float(now_s), found, red(-4, 3), 0.0, None).prefers_high)
+    assert sides == [True, False, True, False, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("recovery", "wanted"),
+    # The way up was found with a larger cylinder: it stays, and stays preferred.
+    [(None, (-1.0, 3.0, False)), (OUT, (-1.0, 5.0, True))],
+)
+def test_what_a_smaller_cylinder_gave_is_not_preferred(recovery, wanted):
+    """After 3.5 s the way down is nearer by the 2 m/s that count."""
+    memory = ResolutionMemory(VALUES, "vs")
+    bands = [Band(-10.0, -5.0, "NONE"), Band(-5.0, -3.0, "MID"), Band(-3.0, -1.0, "NONE"),
+             Band(-1.0, 3.0, "MID"), Band(3.0, 10.0, "NONE")]  # fmt: skip
+    first = memory.step(0.0, Resolution(-6.0, 5.0, True), red(-6, 5), 0.0, None)
+    assert first == (-6.0, 5.0, True)
+    later = memory.step(3.5, Resolution(-1.0, 3.0, False), bands, 0.0, recovery)
+    assert later == wanted
+
+
 @pytest.fixture(scope="module")
 def flown():
     configuration = read_conf(reference_file("alerting/do365b.conf"))
