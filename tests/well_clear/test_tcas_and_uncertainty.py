@@ -142,7 +142,9 @@ SPANS = [
 
 
 def test_how_far_spans_reach_is_that_of_the_worst_within_the_bounds():
-    states, bounds, begin_s, end_s, *wanted = (np.array(part, float).T for part in zip(*SPANS))
+    states, bounds, begin_s, end_s, *wanted = (
+        np.array(part, float).T for part in zip(*SPANS, strict=True)
+    )
     volume = Volume(900.0, 250.0)
     found = detection_span(volume, tuple(states), None, Bounds(*bounds), begin_s, end_s)
     np.testing.assert_allclose(found, wanted, rtol=1e-12)
