@@ -154,13 +154,13 @@ def test_decisions_of_rows_are_taken_widened_and_joined_by_hand():
     """A sensor that scans at rows 0, 2 and 3 of five, with two targets."""
     reason = np.array([[1, 2], [3, 4], [5, 6]], dtype=np.uint8)
     whole = Decision(np.array([0, 2, 3]), reason, 5)
-    for rows, kept, reasons in (
+    for some, kept, reasons in (
         (np.array([0, 1, 3]), [0, 2], [[1, 2], [5, 6]]), (slice(2, 5), [0, 1], [[3, 4], [5, 6]]),
         (slice(1, 2), [], []),
     ):  # fmt: skip
-        part = whole.take_rows(rows)
+        part = whole.take_rows(some)
         assert part.rows.tolist() == kept and part.reason.tolist() == reasons
-        assert part.count == len(np.arange(5)[rows])
+        assert part.count == len(np.arange(5)[some])
     assert whole.at(whole.rows) is reason and whole.at(np.array([0, 2, 3])) is reason
     assert whole.at(np.array([3, 0])).tolist() == [[5, 6], [1, 2]]
     assert whole.at(np.array([0, 1])) is None
