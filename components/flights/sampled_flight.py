@@ -181,9 +181,11 @@ class SampledTrajectory:
         width = max(1, CELLS_AT_ONCE // max(1, count))
         for first in range(0, len(names), width):
             block = slice(first, first + width)
-            position = [np.ascontiguousarray(part[:, block]) for part in (lat_deg, lon_deg, alt_m)]
+            lat, lon, alt = (
+                np.ascontiguousarray(part[:, block]) for part in (lat_deg, lon_deg, alt_m)
+            )
             at = table, start + first * count
-            flights += cls._alike(names[block], time_s, *position, at)
+            flights += cls._alike(names[block], time_s, lat, lon, alt, at)
         return flights
 
     @classmethod
@@ -368,13 +370,8 @@ class SampledFleet(Fleet):
         return evaluate_segments(self._segments(segment, aircraft), elapsed, present)
 
 
-_ROWS = dict(
-    zip(
-        ("lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad"),
-        (*POSITION_ROWS, *ATTITUDE_ROWS),
-        strict=True,
-    )
-)
+_NAMES = "lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad"
+_ROWS = dict(zip(_NAMES, (*POSITION_ROWS, *ATTITUDE_ROWS), strict=True))
 
 
 def _side_by_side(tables: Sequence[FloatArray]) -> FloatArray:

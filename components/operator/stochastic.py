@@ -230,8 +230,7 @@ class Stochastic(Component):
         early = self.p.chooses == "before_executing"
         for k, mind in enumerate(minds):
             if highest[k] < self.p.level:
-                called_off = {"since": None, "chooses_at": None, "acts_at": None}
-                minds[k] = mind._replace(**called_off, has_acted=False)
+                minds[k] = mind._replace(since=None, chooses_at=None, acts_at=None, has_acted=False)
             elif mind.since is None:
                 minds[k] = mind._replace(since=at[k])
         deciding = [k for k, mind in enumerate(minds) if self._decides(mind, at[k])]
