@@ -66,15 +66,15 @@ class TurnTimes:
 
     def keep(self, path: Path, turns: int) -> None:
         """Write the times of turns that are finished, and how many turns there are in all."""
-        times = [[*key, self.cpu_s[key], self.runs[key]] for key in sorted(self.runs)]
-        write_file(path, json.dumps({"turns": turns, "times": times}).encode())
+        taken = [[*key, self.cpu_s[key], self.runs[key]] for key in sorted(self.runs)]
+        write_file(path, json.dumps({"turns": turns, "taken": taken}).encode())
 
     def take_up(self, path: Path) -> tuple[int, int] | None:
         """Read what an earlier attempt kept: turns that are finished, and in all; or None."""
         try:
             content = json.loads(path.read_bytes())
             turns = int(content["turns"])
-            for turn, model, cpu_s, runs in content["times"]:
+            for turn, model, cpu_s, runs in content["taken"]:
                 self.cpu_s[int(turn), int(model)] = float(cpu_s)
                 self.runs[int(turn), int(model)] = int(runs)
         except (FileNotFoundError, ValueError, TypeError, KeyError, RecursionError):
