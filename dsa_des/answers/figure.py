@@ -64,13 +64,14 @@ def _draw_panel(axes: Any, report: AnswerReport, name: str) -> list[Label]:
             fmt="o", markersize=4, color=colour, ecolor=colour, elinewidth=0.9, capsize=2, zorder=3,
         )  # fmt: skip
         apart = max(abs(low), abs(high)) > limit or not 1.0 / _FAR < cost < _FAR
-        if verdict.on_front or apart:
-            labels.append((verdict.model, (cost, value), spread, colour))
+        named = verdict.on_front or apart  # labels keep clear of the points of others too
+        labels.append((verdict.model if named else "", (cost, value), spread, colour))
     costs = [1.0, *(report.costs[verdict.model][0] for verdict in shown)]
     axes.set_xscale("log")
     axes.set_xlim(min(costs) / 1.4, max(costs) * 2.0)
     if limit > 0.0 and most > 20.0 * limit:  # linear within the limit, logarithmic beyond
         axes.set_yscale("symlog", linthresh=limit)
+        axes.yaxis.set_major_formatter("{x:g}")
     if most > 0.0:
         axes.set_ylim(-1.15 * most, 1.15 * most)
     axes.set_title(figure_text(name, 60))

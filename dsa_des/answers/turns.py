@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.costs.replay import median_and_spread
+from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
 from dsa_des.results.folder import StudyFolder
 from dsa_des.studies.executors import Executor
@@ -77,9 +78,12 @@ class TurnTimes:
             for turn, model, cpu_s, runs in content["taken"]:
                 self.cpu_s[int(turn), int(model)] = float(cpu_s)
                 self.runs[int(turn), int(model)] = int(runs)
-        except (FileNotFoundError, ValueError, TypeError, KeyError, RecursionError):
-            self.cpu_s, self.runs = {}, {}
-        return (1 + max(self.runs)[0], turns) if self.runs else None
+        except FileNotFoundError:  # not one turn was finished
+            return None
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            said = "is damaged; without it all turns are run again"
+            raise UsageError(f"{path}: {said}") from error
+        return 1 + max(self.runs)[0], turns
 
     def per_run_ms(self, model: int) -> tuple[float, float]:
         """Return the median over turns, and half the distance between the quartiles."""

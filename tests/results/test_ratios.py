@@ -1,12 +1,15 @@
 """Ratios of events in summaries: by hand, clustered, by class, compared, and how often right."""
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pytest
 
 from components.metrics.risk import risk_ratios_by_class
+from dsa_des.results.printing import gain_text
 from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio
 from dsa_des.results.record import CLASS, EVENT, NUMBER, RATIO, RatioOf, Result
 from dsa_des.results.rows import Rows
@@ -221,3 +224,21 @@ def test_events_of_two_conditions_have_a_weighted_ratio() -> None:
     assert plain.ratio is not None and plain.ratio.ratio == 1.0
     (number,) = compare_axis(rows, "x", 0.0, [FLAGS[2]], 0.95, "t")
     assert number.ratio is None
+
+
+@pytest.mark.parametrize(
+    ("flown", "happened", "said"),
+    [
+        (8, 2, "r: all 8 runs were flown: nothing is gained"),
+        (4, 0, "4 of 8 runs were flown; the event came in none of them, so what is gained is not"),
+        (4, 2, "4 of 8 runs were flown; as wide an interval costs 1.7 times as much with all"),
+        (2, 1, "2 of 8 runs were flown; as wide an interval costs no more with all of them"),
+    ],
+)
+def test_what_a_sample_of_the_runs_gains_is_said(flown: int, happened: int, said: str) -> None:
+    """Four of eight have the event nominally. By hand 1 / 0.575, and (1/3) / 0.325."""
+    nominal, mitigated, stands_for = np.zeros((3, 8))
+    nominal[:4], mitigated[:happened], stands_for[:flown] = 1.0, 1.0, 4.0 / min(flown, 4)
+    found = paired_ratio(nominal, mitigated, stands_for=stands_for)
+    line: Any = SimpleNamespace(ratio=found, at=(), result=SimpleNamespace(name="r"))
+    assert said in gain_text(line)
