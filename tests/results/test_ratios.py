@@ -2,7 +2,6 @@
 
 import math
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -227,18 +226,21 @@ def test_events_of_two_conditions_have_a_weighted_ratio() -> None:
 
 
 @pytest.mark.parametrize(
-    ("flown", "happened", "said"),
+    ("gain", "reason", "events", "more"),
     [
-        (8, 2, "r: all 8 runs were flown: nothing is gained"),
-        (4, 0, "4 of 8 runs were flown; the event came in none of them, so what is gained is not"),
-        (4, 2, "4 of 8 runs were flown; as wide an interval costs 1.7 times as much with all"),
-        (2, 1, "2 of 8 runs were flown; as wide an interval costs no more with all of them"),
+        (2.345, "", 9, "; as wide an interval costs 2.3 times as much with all of them"),
+        (1.0, "", 9, "; as wide an interval costs no more with all of them: nothing is gained"),
+        (1.04, "", 9, "; as wide an interval costs no more with all of them: nothing is gained"),
+        (0.4, "", 9, "; as wide an interval costs no more with all of them: nothing is gained"),
+        (0.0, "", 9, ""), (math.nan, "", 9, ""), (2.0, "too few", 9, ""), (2.0, "too few", 0, ""),
+        (math.nan, "", 0, "; the event came in none of them, so what is gained is not known"),
     ],
-)
-def test_what_a_sample_of_the_runs_gains_is_said(flown: int, happened: int, said: str) -> None:
-    """Four of eight have the event nominally. By hand 1 / 0.575, and (1/3) / 0.325."""
-    nominal, mitigated, stands_for = np.zeros((3, 8))
-    nominal[:4], mitigated[:happened], stands_for[:flown] = 1.0, 1.0, 4.0 / min(flown, 4)
-    found = paired_ratio(nominal, mitigated, stands_for=stands_for)
-    line: Any = SimpleNamespace(ratio=found, at=(), result=SimpleNamespace(name="r"))
-    assert said in gain_text(line)
+)  # fmt: skip
+def test_what_a_choice_of_runs_gained_is_said_in_a_sentence(gain, reason, events, more) -> None:
+    ratio = SimpleNamespace(
+        flown=1200, encounters=34_000, gain=gain, reason=reason, mitigated_events=events
+    )
+    line = SimpleNamespace(ratio=ratio, at=[2.5, "ekf"], result=SimpleNamespace(name="risk"))
+    assert gain_text(line) == f"2.5: ekf: risk: 1,200 of 34,000 runs were flown{more}"
+    ratio.flown = 34_000
+    assert gain_text(line) == "2.5: ekf: risk: all 34,000 runs were flown: nothing is gained"
