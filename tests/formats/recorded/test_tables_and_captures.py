@@ -1,6 +1,7 @@
 """OpenSky's history in CSV and Parquet, tables of one flight, and ASTERIX in captures."""
 
 import json
+import struct
 from datetime import UTC, datetime
 
 import numpy as np
@@ -11,8 +12,9 @@ import recorded_files as write
 
 from components.formats.asterix_records import ADS_B, PLOTS, AsterixRecord, write_records
 from components.formats.measurement_file import read_measurements
+from components.formats.recorded import captures
 from components.formats.recorded.known_kinds import captured_asterix, record
-from components.formats.text_rows import TrafficFileError
+from components.formats.text_rows import Problems, TrafficFileError
 
 START = 1_717_243_200
 
@@ -56,6 +58,38 @@ def read(tmp_path, name, data, **options):
     path = tmp_path / name
     path.write_bytes(data)
     return record(path, **options)
+
+
+def test_columns_as_pandas_writes_them(tmp_path):
+    rows = history()
+    records = [dict(zip(rows, one, strict=True)) for one in zip(*rows.values(), strict=True)]
+    columns = {name: {str(k): v for k, v in enumerate(one)} for name, one in rows.items()}
+    split = {"columns": [*rows], "data": [list(one.values()) for one in records]}
+    plain = read(tmp_path, "a.json", json.dumps(records).encode()).samples
+    assert len(plain["4b1805"]["time"]) == 12
+    for document in (columns, split):
+        found = read(tmp_path, "a.json", json.dumps(document).encode()).samples
+        assert {name: one["lat"].tolist() for name, one in found.items()} == {
+            name: one["lat"].tolist() for name, one in plain.items()
+        }
+
+
+def test_a_drone_s_table_with_clocks_past_midnight_and_no_names(tmp_path):
+    lines = ["time(millisecond),name,latitude,longitude,height_above_takeoff(feet),"
+             "altitude_above_seaLevel(feet)"]  # fmt: skip
+    lines += [f"{100 * k},,47.0,{8 + 1e-5 * k:.5f},{k},{1000 + k}" for k in range(5)]
+    found = read(tmp_path, "mine.csv", "\n".join(lines).encode())
+    own = found.samples["mine"]
+    assert own["time"] == pytest.approx([0, 0.1, 0.2, 0.3, 0.4])
+    assert own["alt"] == pytest.approx([0.3048 * (1000 + k) for k in range(5)])
+    assert found.notes.warnings == ["5 rows have no name: called mine"]
+    late = ["time,id,lat,lon,alt"]
+    late += [f"{hour:02d}:{minute:02d}:00,{name},47,8,{k}" for name in "ab" for k, (hour, minute)
+             in enumerate([(20, 0), (23, 50), (0, 10), (3, 0)])]  # fmt: skip
+    found = read(tmp_path, "late.csv", "\n".join(late).encode())
+    for name in "ab":
+        hours = found.samples[name]["time"] / 3600
+        assert hours == pytest.approx([20, 23 + 5 / 6, 24 + 1 / 6, 27])
 
 
 def as_json(rows: dict[str, list], *, lines: bool) -> bytes:
@@ -172,3 +206,78 @@ def test_a_damaged_file_gives_one_error_or_whole_flights(tmp_path, name):
     if name in ("a.pcap", "a.pcapng", "a.ast"):
         pytest.importorskip("asterix", reason="needs asterix")
     write.assert_refused_or_whole(tmp_path / name, KINDS[name](tmp_path))
+
+
+def udp_v4(payload: bytes, protocol: int = 17, fragment: int = 0) -> bytes:
+    """RFC 791 and 768: a header of 24 bytes, 4 of them an option, and what is behind the end."""
+    size = 24 + 8 + len(payload)
+    ip = struct.pack(">BBHHHBBH8x4x", 0x46, 0, size, 1, fragment, 64, protocol, 0)
+    return ip + struct.pack(">4H", 5, 6, 8 + len(payload), 0) + payload + b"behind it"
+
+
+def udp_v6(payload: bytes) -> bytes:
+    """RFC 8200: a header of 40 bytes."""
+    ip = struct.pack(">IHBB32x", 6 << 28, 8 + len(payload), 17, 64)
+    return ip + struct.pack(">4H", 5, 6, 8 + len(payload), 0) + payload
+
+
+def ethernet(ip: bytes, kind: int = 0x0800, vlans: int = 0) -> bytes:
+    return bytes(12) + b"\x81\x00\x00\x07" * vlans + struct.pack(">H", kind) + ip
+
+
+#: Kind of link, a packet, and what it holds over UDP.
+PACKETS = [
+    (1, ethernet(udp_v4(b"one")), b"one"), (1, ethernet(udp_v4(b"two"), vlans=2), b"two"),
+    (1, ethernet(udp_v6(b"three"), 0x86DD), b"three"), (101, udp_v6(b"four"), b"four"),
+    (0, bytes(4) + udp_v4(b"five"), b"five"), (113, bytes(14) + b"\x08\x00" + udp_v4(b"6"), b"6"),
+    (276, b"\x08\x00" + bytes(18) + udp_v4(b"seven"), b"seven"),
+    (1, ethernet(udp_v4(b"tcp", protocol=6)), None), (1, ethernet(udp_v4(b"arp"), 0x0806), None),
+    (101, udp_v4(b"a part", fragment=0x2000), None), (105, udp_v4(b"of no known link"), None),
+    (101, b"", None), (101, b"\x50" + bytes(60), None), (101, udp_v4(b"")[:19], None),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("magic", captures._PCAP)
+def test_datagrams_of_every_link_are_taken_out_of_a_capture(magic: bytes) -> None:
+    order, fraction_s = {0xD4: ("<", 1e-6), 0xA1: (">", 1e-6), 0x4D: ("<", 1e-9)}[magic[0]]
+    if magic == b"\xa1\xb2\x3c\x4d":
+        fraction_s = 1e-9
+    for link, packet, payload in PACKETS:
+        head = (
+            magic + struct.pack(f"{order}2H3I", 2, 4, 0, 0, 65535) + struct.pack(f"{order}I", link)
+        )
+        good = head[:20] + struct.pack(f"{order}I", 1)
+        other = struct.pack(f"{order}4I", 7, 500, len(packet), len(packet)) + packet
+        known = ethernet(udp_v4(b"known"))
+        last = struct.pack(f"{order}4I", 9, 250, len(known), len(known)) + known
+        if payload is not None:
+            found = captures.udp_payloads(Problems("a.pcap"), head + other)
+            assert found == [(pytest.approx(7 + 500 * fraction_s), payload)]
+            continue
+        with pytest.raises(TrafficFileError, match=rf"no UDP .* packets are of link type {link}\)"):
+            captures.udp_payloads(Problems("a.pcap"), head + other)
+        if link == 1:
+            found = captures.udp_payloads(Problems("a.pcap"), good + other + last)
+            assert found == [(pytest.approx(9 + 250 * fraction_s), b"known")]
+
+
+def test_where_a_capture_is_cut_off_is_said_as_a_whole() -> None:
+    packet = ethernet(udp_v4(b"one"))
+    head = b"\xd4\xc3\xb2\xa1" + bytes(16) + struct.pack("<I", 1)
+    one = struct.pack("<4I", 7, 0, len(packet), len(packet)) + packet
+    block = struct.pack("<3I", 6, 12, 12)
+    for data, said in (
+        (head[:20], "the capture is cut off in its header"),
+        (head, "the capture holds no packets"),
+        (head + one + one[:15], "packet 2: the capture is cut off"),
+        (head + one + one[:-1],
+         f"packet 2: has {len(packet)} bytes, but the capture ends before"),
+        (captures._PCAPNG + b"\x1c\0\0\0", "packet 1: the capture is cut off"),
+        (captures._PCAPNG + struct.pack(">2I", 13, 0), "packet 1: a block of 13 bytes does not fit "
+         "into the capture"),
+        (captures._PCAPNG + struct.pack("<3I", 12, 0x1A2B3C4D, 12)[:8] + block,
+         "packet 2: the block is damaged"),
+    ):  # fmt: skip
+        with pytest.raises(TrafficFileError) as error:
+            captures.udp_payloads(Problems("a.pcap"), data)
+        assert str(error.value) == f"a.pcap: {said}"
