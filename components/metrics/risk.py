@@ -6,7 +6,7 @@ numbers, and has a weight that says how often it happens in the airspace. The ri
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -43,10 +43,21 @@ class RiskParameters(SizeParameters):
     step_s: float | None = STEP
 
 
+class MitigatedParameters(RiskParameters):
+    """What counts as an event, and between whom."""
+
+    platform: str | None = Field(
+        default=None,
+        description="Name of the aircraft from which the others are seen, by default the ownship; "
+        "'*' for events between any two.",
+    )
+
+
 class Mitigated(FlownMetric):
     """Events with and without the manoeuvres that the ownship was told to fly."""
 
-    Parameters = RiskParameters
+    Parameters: ClassVar[Any] = MitigatedParameters
+    of_any_two = True
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
