@@ -1,6 +1,7 @@
-"""``python -m docs.make.equipage FOLDER``: the table of risk by who avoids, of docs/platforms.md.
+"""``python -m docs.make.platforms FOLDER``: a table of docs/platforms.md.
 
-The folder is that of ``dsa-des study equipage``.
+The folder is that of ``dsa-des study equipage`` (risk by who avoids) or ``link_latency`` (range of
+the first alert by the link's latency and loss).
 """
 
 import argparse
@@ -14,11 +15,37 @@ from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say
 
 _EVENTS = {"nmac": "NMACs", "well_clear_lost": "losses of well clear"}
+_LATENCY, _LOSS = "wires[1].delay_s", "wires[1].drop_probability"
+_RANGE = "first_alert_range_m.alerting"
 _NOBODY, _ALONE = "none", ["ownship", "intruder"]
 
 
 def rows(folder: Path) -> list[str]:
-    """Return the lines of the table, and what several that turn bring about.
+    """Return the lines of the table of the study whose folder it is."""
+    names = set(pd.read_parquet(folder / "parts").columns)
+    return latency_rows(folder) if _LATENCY in names else equipage_rows(folder)
+
+
+def latency_rows(folder: Path) -> list[str]:
+    """Return the lines of the table of ranges at the first alert: means, 95 %, by flight."""
+    found = pd.read_parquet(folder / "summary.parquet")
+    found = found[found.result == _RANGE]
+    flights = list(dict.fromkeys(found.flight))
+    lines = [
+        "| latency, s | loss |" + "".join(f" {flight}, m |" for flight in flights),
+        "|---" * (2 + len(flights)) + "|",
+    ]
+    for (latency_s, lost), mine in found.groupby([_LATENCY, _LOSS], sort=True):
+        of = mine.set_index("flight").loc[flights]
+        cells = [
+            f"{one.value:,.0f} ({one.low:,.0f} to {one.high:,.0f})" for one in of.itertuples()
+        ]
+        lines.append(f"| {latency_s:g} | {100 * lost:g} % | {' | '.join(cells)} |")
+    return lines
+
+
+def equipage_rows(folder: Path) -> list[str]:
+    """Return the lines of the table of risk by who avoids, and what several that turn bring about.
 
     Events count by their encounters' weights, as shares of those without anybody's manoeuvres.
     """
@@ -52,9 +79,9 @@ def _cells(one: dict[str, Any]) -> str:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code."""
     parser = argparse.ArgumentParser(
-        prog="python -m docs.make.equipage", description="Print the table of risk by who avoids."
+        prog="python -m docs.make.platforms", description="Print a table of docs/platforms.md."
     )
-    parser.add_argument("folder", type=Path, help="of dsa-des study equipage")
+    parser.add_argument("folder", type=Path, help="of dsa-des study equipage or link_latency")
     for line in rows(parser.parse_args(arguments).folder):
         say(line)
     return 0
