@@ -87,11 +87,8 @@ class Scope:
     def __init__(self, simulation: Simulation, platform: str | None = None) -> None:
         self._per_s = simulation.ticks_per_s
         self._platform = _shown(simulation, platform)
-        components = {
-            name: component
-            for name, component in simulation.components.items()
-            if component.context.platform in ("", self._platform)
-        }
+        on = "", self._platform
+        components = {n: c for n, c in simulation.components.items() if c.context.platform in on}
         #: Blocks whose messages are shown.
         self._on_board = frozenset(components)
         self._own = OwnFlight()

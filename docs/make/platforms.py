@@ -46,7 +46,7 @@ def latency_rows(folder: Path) -> list[str]:
             nearer = range_m[0.0, 0.0, flight] - mine
             half = 1.96 * nearer.std() / len(nearer) ** 0.5
             ends = f"({nearer.mean() - half:,.0f} to {nearer.mean() + half:,.0f})"
-            cells += [f"{mine.mean():,.0f}", f"{nearer.mean():,.0f} {ends}"]
+            cells += [f"{mine.mean():,.0f}", f"{round(nearer.mean()):,} {ends}"]
         lines.append(f"| {latency_s:g} | {100 * lost:g} % | {' | '.join(cells)} |")
     return lines
 
