@@ -9,7 +9,7 @@ import numpy as np
 
 from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.messages.steering import Manoeuvre
-from components.metrics.losses import first_within_s
+from components.metrics.losses import FlightsTogether, first_within_s
 from components.metrics.rows import TargetMetric
 from components.metrics.separation import (
     RelativeFlight,
@@ -67,6 +67,8 @@ class FlownMetric(TargetMetric):
     """
 
     scores = _SCORES
+    #: Whether flights are those of all pairs of aircraft, whoever looks.
+    every_pair = False
 
     def __init__(self, parameters: Any, scene: Scene, *, steered: bool = True) -> None:
         super().__init__(parameters, scene)
@@ -111,6 +113,10 @@ class FlownMetric(TargetMetric):
                 (flights[at],) = flown_as_steered([flights[at]], [there])
                 flights[at].name = name
         return flights
+
+    @property
+    def _looking(self) -> int | None:
+        return None if self.every_pair else self.viewer
 
     def on_platform(self, blocks: Sequence[str]) -> list[str]:
         """Return those of some blocks that are on the platform that looks."""
@@ -194,7 +200,7 @@ class FlownMetric(TargetMetric):
             # As if no more than so many manoeuvres were told: known from when the last of them is.
             some = np.array([k for k in range(len(group)) if len(told.get(k, ())) >= count])
             steering = {k: _by_platform(mine[:count]) for k, mine in told.items()}
-            runs, run_of = flights_of(group, self.p.step_s, None, steering, viewer=self.viewer)
+            runs, run_of = flights_of(group, self.p.step_s, None, steering, viewer=self._looking)
             used, mine = np.unique(run_of[some], return_inverse=True)
             event_s = first_within_s([(radius_m, half_m)], [runs[k] for k in used])[0, mine]
             known = [
@@ -217,13 +223,32 @@ class FlownMetric(TargetMetric):
         """
         runs, run_of = self._flights(group, True, to_the_end)
         alone = [[flight] for run in runs for flight in run]
-        names = sorted({flight.name for (flight,) in alone})
+        names = _names(runs)
         index = {name: number for number, name in enumerate(names)}
         values = read(alone or [[]])
         result = np.full((len(values), len(runs), len(names)), np.nan)
         run = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
         result[:, run, [index[flight.name] for (flight,) in alone]] = values[:, : len(alone)]
         return names, result[:, run_of]
+
+    def ranges_m(self, group: Group, time_s: FloatArray, *, to_the_end: bool) -> FloatArray:
+        """Return the slant range of each target, at a time (replicas, targets) of its own, m.
+
+        Targets are those of `of_each_flight`; NaN where there is no time, or one is not there.
+        """
+        runs, run_of = self._flights(group, True, to_the_end)
+        names = _names(runs)
+        known = [(k, flight) for k, run in enumerate(runs) for flight in run]
+        number_of = {(k, flight.name): n for n, (k, flight) in enumerate(known)}
+        result = np.full(time_s.shape, np.nan)
+        replica, target = np.nonzero(np.isfinite(time_s))
+        of = zip(run_of[replica].tolist(), target.tolist(), strict=True)
+        flight = np.array([number_of[k, names[t]] for k, t in of], dtype=np.int64)
+        if len(flight):
+            together = FlightsTogether([flight for _, flight in known])
+            range_m = together.distances_m(flight, time_s[replica, target])[0]
+            result[replica, target] = np.where(np.isfinite(range_m), range_m, np.nan)
+        return result
 
     def _flights(
         self, group: Group, steered: bool, to_the_end: bool, some: IntArray | None = None
@@ -232,7 +257,7 @@ class FlownMetric(TargetMetric):
         steering = {k: _by_platform(mine) for k, mine in told.items()}
         target, step_s = getattr(self.p, "target", None), self.p.step_s
         return flights_of(
-            group, step_s, target, steering, to_the_end=to_the_end, some=some, viewer=self.viewer
+            group, step_s, target, steering, to_the_end=to_the_end, some=some, viewer=self._looking
         )
 
 
@@ -253,7 +278,7 @@ def flights_of(
     *,
     to_the_end: bool = False,
     some: IntArray | None = None,
-    viewer: int = -1,
+    viewer: int | None = -1,
 ) -> tuple[list[list[RelativeFlight]], IntArray]:
     """Return the flights of runs that differ, and which of these each of `some` replicas is.
 
@@ -302,6 +327,11 @@ def flights_of(
     for number, new_flights in by_run.items():
         runs[run_of[number]] = [flight.flown(new_flights) for flight in runs[run_of[number]]]
     return runs, run_of if some is None else run_of[some]
+
+
+def _names(runs: Sequence[list[RelativeFlight]]) -> list[str]:
+    """Return the names of all targets, in their order."""
+    return sorted({flight.name for run in runs for flight in run})
 
 
 def _told_by(table: Any, name: str) -> list[float]:

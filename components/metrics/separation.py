@@ -73,11 +73,12 @@ def traffic_of(scene: Scene) -> tuple[Any, float]:
 
 
 def separations(
-    scene: Scene, step_s: float | None, until_s: float = math.inf, viewer: int = -1
+    scene: Scene, step_s: float | None, until_s: float = math.inf, viewer: int | None = -1
 ) -> "list[RelativeFlight]":
     """Return the distances of every target of a scene, up to an early end of the run at `until_s`.
 
-    Seen from a target, by its index, it and the ownship (-1) change places.
+    Seen from a target, by its index, it and the ownship (-1) change places. A viewer of None is
+    everybody: all pairs of aircraft, each once.
 
     They are taken on a grid of `step_s` and at the times of the source's own samples. None looks
     between them for losses, with a grid of `STEP_S` for all else.
@@ -85,11 +86,12 @@ def separations(
     source, duration_s = traffic_of(scene)
     end_s = min(duration_s, until_s)
     count = regular_count(step_s or STEP_S, end_s)
-    return [
-        RelativeFlight(source, number, step_s, count, end_s, viewer)
-        for number in range(len(source.targets))
-        if number == viewer or number not in source.unseen
-    ]
+    seen = [number for number in range(len(source.targets)) if number not in source.unseen]
+    if viewer is None:
+        pairs = [(one, other) for one in (-1, *seen) for other in seen if one < other]
+    else:
+        pairs = [(viewer, other) for other in sorted({*seen, viewer} - {-1})]
+    return [RelativeFlight(source, k, step_s, count, end_s, one) for one, k in pairs]
 
 
 class RelativeFlight:

@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 import dsa_des
 from components.examples import folder as examples
-from docs.make.equipage import rows
+from docs.make.platforms import rows
 from dsa_des.cli import main
 from dsa_des.files.toml_files import to_toml
 

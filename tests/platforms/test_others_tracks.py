@@ -4,6 +4,7 @@ import numpy as np
 import pyarrow.compute as pc
 import pymap3d
 import pytest
+from click.testing import CliRunner
 from covering import covers
 from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 
@@ -12,8 +13,10 @@ from components.alerting.others_tracks import OthersTracks
 from components.estimation.motion import ConstantVelocity
 from components.messages.columns import ORIGIN
 from components.messages.state_tracks import COVARIANCE
+from docs.make.platforms import rows
 from dsa_des import SceneError
 from dsa_des.arrays.keyed_table import KeyedTable
+from dsa_des.cli import main
 from dsa_des.running.simulation import Simulation
 
 RADAR = "configs/platforms/ground_radar.toml"
@@ -276,3 +279,15 @@ def test_the_likeliest_mistakes_are_said(path, mistake, said):
         Simulation(load(tables))
     assert said in str(refused.value)
     assert len(refused.value.problems) == 1
+
+
+def test_an_alert_of_who_turns_in_is_later_by_the_link_s_latency(tmp_path):
+    """At 55 m/s the two come 110 m nearer in 2 s; to a steady flight latency is nothing."""
+    call = ["study", "link_latency", "--set", "replicas=8", "--workers", "1", "--quiet"]
+    done = CliRunner().invoke(main, [*call, "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    cells = [line.strip("| ").split(" | ") for line in rows(tmp_path / "out")[2:]]
+    nearer = {(float(c[0]), c[1]): [float(c[k].split()[0]) for k in (3, 5)] for c in cells}
+    assert nearer[0.0, "0 %"] == [0.0, 0.0]
+    assert nearer[2.0, "0 %"] == [pytest.approx(0.0, abs=110.0), pytest.approx(109.0, abs=15.0)]
+    assert nearer[1.0, "0 %"][1] == pytest.approx(nearer[2.0, "0 %"][1] / 2.0, abs=10.0)

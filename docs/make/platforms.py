@@ -1,6 +1,7 @@
-"""``python -m docs.make.equipage FOLDER``: the table of risk by who avoids, of docs/platforms.md.
+"""``python -m docs.make.platforms FOLDER``: a table of docs/platforms.md.
 
-The folder is that of ``dsa-des study equipage``.
+The folder is that of ``dsa-des study equipage`` (risk by who avoids) or ``link_latency`` (range of
+the first alert by the link's latency and loss).
 """
 
 import argparse
@@ -14,11 +15,44 @@ from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say
 
 _EVENTS = {"nmac": "NMACs", "well_clear_lost": "losses of well clear"}
+_LATENCY, _LOSS = "wires[1].delay_s", "wires[1].drop_probability"
+_RANGE = "first_alert_range_m.alerting"
 _NOBODY, _ALONE = "none", ["ownship", "intruder"]
 
 
 def rows(folder: Path) -> list[str]:
-    """Return the lines of the table, and what several that turn bring about.
+    """Return the lines of the table of the study whose folder it is."""
+    names = set(pd.read_parquet(folder / "parts").columns)
+    return latency_rows(folder) if _LATENCY in names else equipage_rows(folder)
+
+
+def latency_rows(folder: Path) -> list[str]:
+    """Return the lines of the table of ranges at the first alert, by latency and loss.
+
+    Beside the mean of each flight is how much nearer it is, run by run, than with a link that is at
+    once and loses nothing, with a 95 % interval (normal).
+    """
+    runs = pd.read_parquet(folder / "parts")
+    flights = list(dict.fromkeys(runs.flight))
+    lines = [
+        "| latency, s | loss |" + "".join(f" {one}, m | nearer by, m |" for one in flights),
+        "|---" * (2 + 2 * len(flights)) + "|",
+    ]
+    range_m = runs.pivot(index="replica", columns=[_LATENCY, _LOSS, "flight"], values=_RANGE)
+    for latency_s, lost in sorted({(one[0], one[1]) for one in range_m.columns}):
+        cells = []
+        for flight in flights:
+            mine = range_m[latency_s, lost, flight]
+            nearer = range_m[0.0, 0.0, flight] - mine
+            half = 1.96 * nearer.std() / len(nearer) ** 0.5
+            ends = f"({nearer.mean() - half:,.0f} to {nearer.mean() + half:,.0f})"
+            cells += [f"{mine.mean():,.0f}", f"{round(nearer.mean()):,} {ends}"]
+        lines.append(f"| {latency_s:g} | {100 * lost:g} % | {' | '.join(cells)} |")
+    return lines
+
+
+def equipage_rows(folder: Path) -> list[str]:
+    """Return the lines of the table of risk by who avoids, and what several that turn bring about.
 
     Events count by their encounters' weights, as shares of those without anybody's manoeuvres.
     """
@@ -52,9 +86,9 @@ def _cells(one: dict[str, Any]) -> str:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code."""
     parser = argparse.ArgumentParser(
-        prog="python -m docs.make.equipage", description="Print the table of risk by who avoids."
+        prog="python -m docs.make.platforms", description="Print a table of docs/platforms.md."
     )
-    parser.add_argument("folder", type=Path, help="of dsa-des study equipage")
+    parser.add_argument("folder", type=Path, help="of dsa-des study equipage or link_latency")
     for line in rows(parser.parse_args(arguments).folder):
         say(line)
     return 0
