@@ -267,7 +267,7 @@ def misspelt(tables):
         (BOTH, camera, "blocks.tracks: is carried by 'ownship', as eo_tracker feeds it, and "
          "tracker on 'site' feeds it too: which of them it is on, its table must say"),
         (RADAR, forgotten, "avoidance is on 'site', which stands and is not steered"),
-        (BOTH, two_gates, "takes from one, as from one place"),
+        (BOTH, two_gates, "has 2 writers, and takes one: gate.targets, gate_air.targets"),
         (BOTH, detections, "a block looks from one place"),
         (RADAR, misspelt, "there is no such aircraft or place; did you mean 'site'?"),
     ],
