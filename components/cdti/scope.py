@@ -46,6 +46,8 @@ from dsa_des.text.safe_text import printable
 FORGOTTEN_S = 10.0
 #: Bands of guidance stand for so long, s: until the alerting has looked again.
 BANDS_LAST_S = 1.5
+#: A sensor from which nothing has come for so many of its scans, and so long, is said to be out.
+_SILENT_SCANS, _SILENT_S = 2.5, 1.0
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 _LOOKAHEAD_S = 120.0
 _UNKNOWN = (None, None, None)
@@ -76,6 +78,8 @@ class Received(NamedTuple):
     #: Altitude and rate of climb that targets report themselves, m and m/s, and when.
     reported: dict[int, tuple[float, float, float]]
     bands: tuple[float, GuidanceBands] | None
+    #: When each sensor was heard of last, s.
+    heard: dict[str, float]
 
 
 class Scope:
@@ -100,6 +104,8 @@ class Scope:
         self._bands: tuple[float, GuidanceBands] | None = None
         #: What was made of the latest alerts, for as long as they are the latest.
         self._looked: tuple[_Alerts, Any, Any, Any] | None = None
+        self._heard: dict[str, float] = {}
+        self._silence_s = _longest_silence_s(simulation)
         self._names: tuple[str, ...] = ()
         #: Names of all targets, fit to be shown.
         self.names: list[str] = []
@@ -130,6 +136,7 @@ class Scope:
             self._sights.states = message
             self._name(message.roster.names)
         elif isinstance(message, Detections):
+            self._heard = {**self._heard, block: int(message.tick[-1]) / self._per_s}
             self._sights.take(block, message, self._per_s)
             self._take_reports(message)
         elif isinstance(message, AlertLevels):
@@ -201,8 +208,9 @@ class Scope:
     def received(self) -> Received:
         """Return all that was received until now; between two windows it is of one instant."""
         return Received(
-            self._own.now, self._contacts, self._alerts, self._since, self._reported, self._bands
-        )
+            self._own.now, self._contacts, self._alerts, self._since, self._reported, self._bands,
+            self._heard,
+        )  # fmt: skip
 
     def level_of(self, contact: int) -> int:
         """Return the level of the alert on a contact, 0 without one."""
@@ -221,11 +229,13 @@ class Scope:
 
     def picture(self, time_s: float, received: Received | None = None) -> dict[str, Any]:
         """Return what is shown at an instant of what was received, for JSON: m, deg, s."""
-        own, contacts, alerts, since, reported, bands = (
+        own, contacts, alerts, since, reported, bands, heard = (
             self.received() if received is None else received
         )
         if own is None:
-            return {"own": None, "contacts": [], "alerts": [], "area": [], "bands": {}}
+            return {
+                "own": None, "contacts": [], "alerts": [], "area": [], "bands": {}, "out": []
+            }  # fmt: skip
         shown = [] if contacts is None else contacts.shown(own, time_s, FORGOTTEN_S)
         flights: dict[int, list[float]] = {}
         said: list[dict[str, Any]] = []
@@ -254,6 +264,11 @@ class Scope:
             "alerts": said,
             "area": area,
             "bands": _bands_at(bands, time_s),
+            "out": [
+                printable(name)
+                for name, longest_s in self._silence_s.items()
+                if time_s - heard.get(name, 0.0) > longest_s
+            ],
         }
 
     def camera(self, picture: dict[str, Any], time_s: float, chosen: int) -> dict[str, Any] | None:
@@ -377,6 +392,24 @@ def _rules_of(components: Mapping[str, Component]) -> tuple[Configuration, Alert
             configuration = read_conf(component.p.conf)
             return configuration, configuration.alerters[component.p.alerter - 1]
     return None
+
+
+def _longest_silence_s(simulation: Simulation) -> dict[str, float]:
+    """Return after which silence each sensor is out, s: those that are switched on at the start."""
+    scene, result = simulation.scene, dict[str, float]()
+    for name, component in sorted(simulation.components.items()):
+        sends = any(issubclass(o.message, Detections) for o in component.outputs.values())
+        if not sends or not getattr(component.p, "enabled", True):
+            continue
+        every = [
+            one.blocks[name].parameters for one in (scene, *(s.scene for s in scene.stretches))
+        ]
+        clocks = [clock for p in every if (clock := component.clock_of(p)) is not None]
+        if clocks:
+            slowest_s = max(float(1 / clock.rate_hz) for clock in clocks)
+            first_s = max(float(clock.offset_s) for clock in clocks)
+            result[name] = max(_SILENT_SCANS * slowest_s, _SILENT_S) + first_s
+    return result
 
 
 def _sensor(name: str, component: Component) -> dict[str, Any]:

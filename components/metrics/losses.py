@@ -121,9 +121,9 @@ class FlightsTogether:
 
     def level_distances_m(self, flight: IntArray, time_s: FloatArray) -> tuple[FloatArray, ...]:
         """Return horizontal distance and difference of altitudes; infinite where one is absent."""
-        return self.distances_m(flight, time_s)[1:]
+        return self.apart_m(flight, time_s)[1:]
 
-    def distances_m(self, flight: IntArray, time_s: FloatArray) -> tuple[FloatArray, ...]:
+    def apart_m(self, flight: IntArray, time_s: FloatArray) -> tuple[FloatArray, ...]:
         """Return `separation.distances_m` of flights (n,), each at a time (n,) of its own."""
         blocks = []
         for first in range(0, len(flight), CELLS_AT_ONCE):

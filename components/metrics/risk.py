@@ -7,7 +7,7 @@ numbers, and has a weight that says how often it happens in the airspace. The ri
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -45,10 +45,21 @@ class RiskParameters(SizeParameters):
     step_s: float | None = STEP
 
 
+class MitigatedParameters(RiskParameters):
+    """What counts as an event, and between whom."""
+
+    platform: str | None = Field(
+        default=None,
+        description="Name of the aircraft from which the others are seen, by default the ownship; "
+        "'*' for events between any two.",
+    )
+
+
 class Mitigated(FlownMetric):
     """Events with and without the manoeuvres that the ownship was told to fly."""
 
-    Parameters = RiskParameters
+    Parameters: ClassVar[Any] = MitigatedParameters
+    of_any_two = True
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
@@ -102,8 +113,8 @@ class Mitigated(FlownMetric):
 class LeastSeparationParameters(RiskParameters):
     """Whose pairs count, what is a loss, and how it is found."""
 
-    platform: str | None = Field(
-        default=None, description="Name of the aircraft whose pairs count; by default any two."
+    platform: str = Field(
+        default="*", description="Name of the aircraft whose pairs count; by default any two."
     )
     steered: bool = Field(
         default=True, description="Take flights with everybody's manoeuvres, not as planned."
@@ -117,10 +128,10 @@ class LeastSeparation(FlownMetric):
     """
 
     Parameters = LeastSeparationParameters
+    of_any_two = True
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene, steered=parameters.steered)
-        self.every_pair = parameters.platform is None
 
     def results(self) -> list[Result]:
         """Return the distance, its time, and both events."""

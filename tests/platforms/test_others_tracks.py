@@ -1,6 +1,7 @@
 """Tracks that one platform sends to another: their frame, their sureness, and whose they are."""
 
 import numpy as np
+import pandas as pd
 import pyarrow.compute as pc
 import pymap3d
 import pytest
@@ -13,7 +14,7 @@ from components.alerting.others_tracks import OthersTracks
 from components.estimation.motion import ConstantVelocity
 from components.messages.columns import ORIGIN
 from components.messages.state_tracks import COVARIANCE
-from docs.make.platforms import rows
+from docs.make.platforms.link_latency import rows
 from dsa_des import SceneError
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.cli import main
@@ -286,7 +287,10 @@ def test_an_alert_of_who_turns_in_is_later_by_the_link_s_latency(tmp_path):
     call = ["study", "link_latency", "--set", "replicas=8", "--workers", "1", "--quiet"]
     done = CliRunner().invoke(main, [*call, "--out", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
-    cells = [line.strip("| ").split(" | ") for line in rows(tmp_path / "out")[2:]]
+    cells = [
+        line.strip("| ").split(" | ")
+        for line in rows([pd.read_parquet(tmp_path / "out" / "parts")])[2:]
+    ]
     nearer = {(float(c[0]), c[1]): [float(c[k].split()[0]) for k in (3, 5)] for c in cells}
     assert nearer[0.0, "0 %"] == [0.0, 0.0]
     assert nearer[2.0, "0 %"] == [pytest.approx(0.0, abs=110.0), pytest.approx(109.0, abs=15.0)]

@@ -13,6 +13,7 @@ RADAR = {
 }  # fmt: skip
 CAMERA = {"type": "optical.ir", "scan_rate_hz": 1, "azimuth_pixels": 640, "elevation_pixels": 480}
 OF_ALL = """
+weather cells: not simulated, [weather] has no cells
 cues: not simulated, no wire brings cues
 mounting: not simulated, it looks along the nose and misalignment_deg is 0
 glint: not simulated, errors is 'grid'
