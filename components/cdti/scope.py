@@ -5,6 +5,7 @@ replaced as a whole, never changed.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -27,6 +28,7 @@ from components.messages.alerts import (
     GuidanceBands,
     contact_name,
 )
+from components.messages.decisions import Decisions
 from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import StateTracks
@@ -36,6 +38,7 @@ from components.sensor.marks import IR
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
+from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.running.simulation import Simulation
 from dsa_des.text.safe_text import printable
 
@@ -80,12 +83,20 @@ class Received(NamedTuple):
 
 
 class Scope:
-    """The state of the display."""
+    """The state of the display on a platform, by default that of the operator's console.
 
-    def __init__(self, simulation: Simulation) -> None:
+    It shows what the blocks on board of it say; without a console, on board of the ownship.
+    """
+
+    def __init__(self, simulation: Simulation, platform: str | None = None) -> None:
         self._per_s = simulation.ticks_per_s
+        self._platform = _shown(simulation, platform)
+        on = "", self._platform
+        components = {n: c for n, c in simulation.components.items() if c.context.platform in on}
+        #: Blocks whose messages are shown.
+        self._on_board = frozenset(components)
         self._own = OwnFlight()
-        self._sights = CameraSights(simulation.components)
+        self._sights = CameraSights(components)
         self._contacts: Contacts | None = None
         self._alerts: _Alerts | None = None
         self._since: dict[int, float] = {}
@@ -98,10 +109,10 @@ class Scope:
         self._names: tuple[str, ...] = ()
         #: Names of all targets, fit to be shown.
         self.names: list[str] = []
-        self._rules = _rules_of(simulation)
+        self._rules = _rules_of(components)
         senders = {
             type_of
-            for block in simulation.components.values()
+            for block in components.values()
             for type_of in (o.message for o in block.outputs.values())
         }
         kinds = (StateTracks, Tracks, FusedDetections)
@@ -109,7 +120,7 @@ class Scope:
         self._believed = next((k for k in kinds if any(issubclass(t, k) for t in senders)), None)
         self.sensors = [
             _sensor(name, component)
-            for name, component in sorted(simulation.components.items())
+            for name, component in sorted(components.items())
             if any(issubclass(o.message, Detections) for o in component.outputs.values())
         ]
 
@@ -117,9 +128,10 @@ class Scope:
 
     def listen(self, block: str, message: Message) -> None:
         """Take in what a block has sent."""
-        if len(message) == 0:
+        if len(message) == 0 or block not in self._on_board:
             return
         if isinstance(message, TrafficStates):
+            message = message.seen_from(self._platform or message.roster.own_name)
             self._own.take(message, self._per_s)
             self._sights.states = message
             self._name(message.roster.names)
@@ -350,11 +362,32 @@ def _flights(alerts: _Alerts) -> dict[int, list[float]]:
     return {int(t): flight for t, flight in zip(alerts.target, rounded, strict=True)}
 
 
-def _rules_of(simulation: Simulation) -> tuple[Configuration, Alerter] | None:
+def _shown(simulation: Simulation, platform: str | None) -> str:
+    """Return what carries a display: what is asked for, else what carries the console.
+
+    Empty where nothing is known to carry a block; `UsageError` for what carries none.
+    """
+    blocks = simulation.components.values()
+    known = sorted({one.context.platform for one in blocks} - {""})
+    if platform is not None and platform not in known:
+        raise UsageError(
+            f"--platform {platform!r}: nothing of this scene is carried by it"
+            f"{did_you_mean(platform, known)}"
+        )
+    consoles = [
+        one.context.platform
+        for one in blocks
+        if any(issubclass(output.message, Decisions) for output in one.outputs.values())
+    ]
+    first = [name for one in blocks for name in one.platforms()[:1] if name in known]
+    return platform or next(iter([*consoles, *first, *known]), "")
+
+
+def _rules_of(components: Mapping[str, Component]) -> tuple[Configuration, Alerter] | None:
     """Return the configuration and the alerter of the alerting block, if there is one."""
     from components.alert_configuration.conf_file import read_conf
 
-    for component in simulation.components.values():
+    for component in components.values():
         if any(issubclass(o.message, AlertLevels) for o in component.outputs.values()):
             configuration = read_conf(component.p.conf)
             return configuration, configuration.alerters[component.p.alerter - 1]

@@ -72,8 +72,8 @@ def _draw_panel(axes: Any, report: AnswerReport, name: str) -> list[Label]:
     if limit > 0.0 and most > 20.0 * limit:  # linear within the limit, logarithmic beyond
         axes.set_yscale("symlog", linthresh=limit)
         axes.yaxis.set_major_formatter("{x:g}")
-    if most > 0.0:
-        axes.set_ylim(-1.15 * most, 1.15 * most)
+    reach = 1.15 * most if most > 0.0 else 1.0  # no model changes anything
+    axes.set_ylim(-reach, reach)
     axes.set_title(figure_text(name, 60))
     axes.set_xlabel("CPU, by that of the scene as it is")
     unit = unit_of(name)

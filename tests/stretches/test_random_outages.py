@@ -153,7 +153,8 @@ def test_a_frozen_radar_sends_its_last_detections_again_and_again():
     assert false["true_range_m"].null_count == len(false) > 0
     # One that is frozen before its first scan has no values of its own, and sends none of others.
     early = scene(duration_s=12, outages=[outage("radar", mode="frozen", mean_between_s=2)])
-    same_as_alone(replicas_of(early, *[{"blocks.radar.offset_s": 3}] * 4), window=30)
+    loud = {"blocks.radar.offset_s": 3, "blocks.radar.power_w": 8000}
+    same_as_alone(replicas_of(early, *[loud] * 4), window=30)
 
 
 @covers("stuck", of=("[outages]",))
