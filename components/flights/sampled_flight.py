@@ -220,8 +220,13 @@ class SampledTrajectory:
             flights.append(made)
         return flights
 
-    def in_wind(self, east_mps: float, north_mps: float) -> SampledTrajectory:
-        """Return the same flight with what was derived of its attitude derived with a wind."""
+    def in_air(
+        self, east_mps: float, north_mps: float, alt_m: FloatArray | None = None
+    ) -> SampledTrajectory:
+        """Return the same flight with what was derived of its attitude derived with a wind.
+
+        With `alt_m` it is at these altitudes.
+        """
         known = {
             f"{angle}_rad": getattr(self, f"{angle}_rad")
             for angle in ("yaw", "pitch", "roll")
@@ -232,7 +237,7 @@ class SampledTrajectory:
             self.sample_times_s,
             self.lat_deg,
             self.lon_deg,
-            self.alt_m,
+            self.alt_m if alt_m is None else alt_m,
             velocity_enu_mps=self.velocity_enu_mps,
             wind_east_north_mps=(east_mps, north_mps),
             away=self.away,

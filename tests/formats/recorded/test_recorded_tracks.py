@@ -38,8 +38,8 @@ def test_tracks_in_xml_are_flown(tmp_path, data):
     assert list(read_in.samples) == ["one", "two"]
     assert_flown(read_in.samples["one"], FIXES)
     assert_flown(read_in.samples["two"], OTHER)
-    assert read_in.height == "geometric altitude"
-    assert "geometric altitude is read: there is no barometric altitude" in read_in.notes.harmless
+    assert read_in.height == "geometric altitude above mean sea level"
+    assert f"{read_in.height} is read: there is no barometric altitude" in read_in.notes.harmless
 
 
 def test_placemarks_with_times_are_the_document_s_flight(tmp_path):
@@ -82,6 +82,10 @@ def test_heights_that_are_none_are_said(tmp_path):
     some = write.gpx({"one": FIXES}).replace(b"<ele>1000.0</ele>", b"")
     warnings = read(tmp_path, "a.gpx", some).notes.warnings
     assert warnings == ["1 point was left out that had no height"]
+    with pytest.raises(
+        TrafficFileError, match=r"point 1, column geometric .* 100001000\.0 is out of"
+    ):
+        read(tmp_path, "a.gpx", write.gpx({"one": FIXES}).replace(b"<ele>10", b"<ele>1000010"))
     low = write.kml({"one": FIXES}).replace(b">absolute<", b">relativeToGround<")
     (warning,) = read(tmp_path, "a.kml", low).notes.warnings
     assert warning.startswith("heights are above ground (altitudeMode relativeToGround)")
