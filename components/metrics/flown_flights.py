@@ -9,7 +9,7 @@ import numpy as np
 
 from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.messages.steering import Manoeuvre
-from components.metrics.losses import first_within_s
+from components.metrics.losses import FlightsTogether, first_within_s
 from components.metrics.rows import TargetMetric
 from components.metrics.separation import (
     ANY_TWO,
@@ -233,13 +233,32 @@ class FlownMetric(TargetMetric):
         """
         runs, run_of = self._flights(group, True, to_the_end)
         alone = [[flight] for run in runs for flight in run]
-        names = sorted({flight.name for (flight,) in alone})
+        names = _names(runs)
         index = {name: number for number, name in enumerate(names)}
         values = read(alone or [[]])
         result = np.full((len(values), len(runs), len(names)), np.nan)
         run = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
         result[:, run, [index[flight.name] for (flight,) in alone]] = values[:, : len(alone)]
         return names, result[:, run_of]
+
+    def ranges_m(self, group: Group, time_s: FloatArray, *, to_the_end: bool) -> FloatArray:
+        """Return the slant range of each target, at a time (replicas, targets) of its own, m.
+
+        Targets are those of `of_each_flight`; NaN where there is no time, or one is not there.
+        """
+        runs, run_of = self._flights(group, True, to_the_end)
+        names = _names(runs)
+        known = [(k, flight) for k, run in enumerate(runs) for flight in run]
+        number_of = {(k, flight.name): n for n, (k, flight) in enumerate(known)}
+        result = np.full(time_s.shape, np.nan)
+        replica, target = np.nonzero(np.isfinite(time_s))
+        of = zip(run_of[replica].tolist(), target.tolist(), strict=True)
+        flight = np.array([number_of[k, names[t]] for k, t in of], dtype=np.int64)
+        if len(flight):
+            together = FlightsTogether([flight for _, flight in known])
+            range_m = together.apart_m(flight, time_s[replica, target])[0]
+            result[replica, target] = np.where(np.isfinite(range_m), range_m, np.nan)
+        return result
 
     def _flights(
         self, group: Group, steered: bool, to_the_end: bool, some: IntArray | None = None
@@ -317,6 +336,11 @@ def flights_of(
     for number, new_flights in by_run.items():
         runs[run_of[number]] = [flight.flown(new_flights) for flight in runs[run_of[number]]]
     return runs, run_of if some is None else run_of[some]
+
+
+def _names(runs: Sequence[list[RelativeFlight]]) -> list[str]:
+    """Return the names of all targets, in their order."""
+    return sorted({flight.name for run in runs for flight in run})
 
 
 def _aircraft_of(run: Sequence[RelativeFlight]) -> dict[int, Any]:

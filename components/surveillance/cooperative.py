@@ -20,7 +20,7 @@ from components.sensor.sensor import Sensor
 from components.surveillance.reports import CooperativeReports
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Output
-from dsa_des.errors import Disagreements
+from dsa_des.errors import Disagreements, did_you_mean
 from dsa_des.record.undone import NO_COUNTS, with_cases
 
 #: Half of the time between positions that a velocity is of; a power of two.
@@ -55,6 +55,12 @@ class CooperativeParameters(SensorParameters):
         ge=0,
         description="Standard deviation of what reported pressure altitudes are from heights, as "
         "stated to trackers: those that carry errors of each aircraft estimate it, m.",
+    )
+
+    leaves_out: list[str] = Field(
+        default=[],
+        description="Names of aircraft whose reports are left out, known by their address: those "
+        "to which the tracks go, from another platform.",
     )
 
     @model_validator(mode="before")
@@ -143,6 +149,23 @@ class CooperativeSensor(Sensor):
     def undone(self) -> dict[str, IntArray]:
         """Return how many of those heard sent no altitude, by run, and with it no place."""
         return {**super().undone(), NO_CODE: self._unplaced}
+
+    def setup(self) -> None:
+        """Refuse to leave out whom there is not."""
+        super().setup()
+        names = [name for roster in known_targets(self.context) for name in roster.names]
+        for name in self.p.leaves_out if names else ():
+            if name not in names:
+                raise ValueError(f"leaves_out: there is no {name!r}{did_you_mean(name, names)}")
+
+    def of_others(self, cells: Cells, heard: BoolArray, address: IntArray) -> BoolArray:
+        """Return which cells are heard that have no address of an aircraft that is left out."""
+        roster = cells.roster
+        for name in self.p.leaves_out:
+            craft = np.full(len(cells), roster.names.index(name))
+            craft = craft if roster.shared else roster.craft(craft, cells.run)
+            heard = heard & (address != roster.equipage.address[craft])
+        return heard
 
     def placed(self, cells: Cells, heard: IntArray, altitude_m: FloatArray) -> BoolArray:
         """Return which of the cells that were heard are placed: one without an altitude is not.

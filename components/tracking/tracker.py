@@ -32,6 +32,7 @@ from components.tracking.out_of_sequence import (
 from components.tracking.promises import ACTS_EVERY_S, Silence
 from components.tracking.reported_errors import (
     coarse_bearings,
+    folded_ranges,
     reported_errors,
     unknown_latency,
 )
@@ -170,7 +171,7 @@ class Tracker(Component):
                 )
         if not self._estimator.errors:
             result += unknown_latency(offers)
-        return super().warnings() + result + coarse_bearings(offers)
+        return super().warnings() + result + coarse_bearings(offers) + folded_ranges(offers)
 
     def offer(self, port: str) -> Any:
         """Hand on what the sensors say of themselves; with ranges where directions give them."""

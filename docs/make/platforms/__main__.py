@@ -1,7 +1,7 @@
 """``python -m docs.make.platforms FOLDER ...``: a table of docs/platforms.md, of studies' folders.
 
-The folders are those of ``dsa-des study equipage``, or of ``velocity_pairs`` and
-``velocity_rings``; also with fewer cells, or stopped before their end: what is there counts
+The folders are those of ``dsa-des study equipage`` or ``link_latency``, or of ``velocity_pairs``
+and ``velocity_rings``; also with fewer cells, or stopped before their end: what is there counts
 together.
 """
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pandas as pd  # type: ignore[import-untyped]
 
-from docs.make.platforms import campaign, equipage
+from docs.make.platforms import campaign, equipage, link_latency
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say
 
@@ -25,6 +25,7 @@ def main(arguments: list[str] | None = None) -> int:
     folders = parser.parse_args(arguments).folders
     runs = [pd.read_parquet(folder / "parts") for folder in folders]
     rows = equipage.rows if "equipage" in runs[0] else campaign.rows
+    rows = link_latency.rows if link_latency.LATENCY in runs[0] else rows
     for line in rows(runs):
         say(line)
     return 0
