@@ -168,8 +168,10 @@ class AspectRcs(Effect[CellValues]):
         )
 
     def build(self, block: Any) -> CellValues:
-        """Return each cell's mean RCS; a target without a table has its constant."""
-        return mean_rcs_m2
+        """Return each cell's mean RCS; one of a target without a table, or where tables are not
+        asked for, is its constant.
+        """
+        return mean_rcs_m2 if block.p.aspect_rcs else constant_rcs_m2
 
 
 def models_of(swerling: int | None) -> ModelsOfCells:

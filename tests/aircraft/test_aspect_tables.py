@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from wired import HEARS_ALL, SEES_ALL, chain, decided, first_look, run
 
+import dsa_des
+
 AZIMUTHS, ELEVATIONS = range(0, 360, 10), range(-90, 91, 10)
 OTHERS = (
     # Passing below to the left, seen from behind; and far above, nearly inverted.
@@ -64,6 +66,10 @@ def test_aspect_rcs_off_is_the_constant_rcs(tmp_path):
     assert {name: row["snr_db"] for name, row in found.items()} == pytest.approx(
         {name: row["snr_db"] for name, row in reference.items()}
     )
+    # Simulating everything asks for no table that a key says to leave out.
+    scene = chain({"radar": radar}, targets=targets)
+    everything = dsa_des.run(scene, simulate_everything=True)["detections"].to_pylist()
+    assert everything == dsa_des.run(scene)["detections"].to_pylist()
 
 
 @pytest.mark.parametrize(("kind", "band"), [("optical.eo", "eo"), ("optical.ir", "ir")])
