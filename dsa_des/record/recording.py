@@ -22,6 +22,7 @@ from dsa_des.block.message import Message, rows_of
 from dsa_des.block.recorded_columns import LEADING, PLATFORM
 from dsa_des.errors import nearest
 from dsa_des.record.sinks import Sink
+from dsa_des.record.text_codes import TextCodes
 from dsa_des.time.runs import Runs
 
 # Declared names that an error lists.
@@ -124,7 +125,7 @@ class Recorder:
         #: What came since `_read`, and of it what more messages of a block may join.
         self._groups: list[_AlikeMessages] = []
         self._open: dict[str, list[_AlikeMessages]] = {}
-        self._texts: dict[tuple[str, str], _TextCodes] = {}
+        self._texts: dict[tuple[str, str], TextCodes] = {}
         self._declared = DeclaredColumns({}, _LEADING)
         self.rows: dict[str, int] = {}
         self._ends: Runs | None = None
@@ -319,7 +320,7 @@ class Recorder:
         if kind == "text":
             says: dict[str, Callable[[str], str | None]]
             says = {"block": str, PLATFORM: self._platforms.get}
-            text = self._texts.setdefault((table, name), _TextCodes(name, says.get(name)))
+            text = self._texts.setdefault((table, name), TextCodes(name, says.get(name)))
             codes = _joined([text.codes(block, columns) for block, columns in pieces], order)
             return Text(codes, text.names)
         given: list[Any] = [columns.get(name) for _, columns in pieces]
@@ -356,45 +357,6 @@ def _instants(columns: Columns) -> RunTicks:
     tick: Any = columns["tick"]
     run: Any = columns.get("replica")
     return RunTicks(no_runs(len(tick)) if run is None else run, tick)
-
-
-class _TextCodes:
-    """The names that a text column has held so far, and what its pieces' own codes become."""
-
-    def __init__(self, column: str, of_block: Callable[[str], str | None] | None) -> None:
-        #: Of each block what its rows hold; None of columns that messages fill.
-        self._column, self._of_block = column, of_block
-        self._code: dict[str, int] = {}
-        #: By identity of a tuple of names, which is kept so that the identity stays its own.
-        self._lookups: dict[int, tuple[tuple[str, ...], AnyArray]] = {}
-        self.names: tuple[str, ...] = ()
-
-    def codes(self, block: str, columns: Columns) -> AnyArray:
-        """Return one piece's codes into our names; -1 is null."""
-        count = len(columns["tick"])
-        if self._of_block is not None:
-            name = self._of_block(block)
-            code = -1 if name is None else self._lookup((name,))[0]
-            return constant(code, count, "int32")
-        text = columns.get(self._column)
-        if text is None:
-            return constant(-1, count, "int32")
-        if not isinstance(text, Text):
-            raise TypeError(f"column {self._column!r} must be Text")
-        return self._lookup(text.names).take(text.codes, mode="wrap")  # -1 takes the last entry
-
-    def _lookup(self, names: tuple[str, ...]) -> AnyArray:
-        known = self._lookups.get(id(names))
-        if known is not None and known[0] is names:
-            return known[1]
-        codes = [self._code.setdefault(name, len(self._code)) for name in names]
-        lookup = np.array([*codes, -1], dtype=np.int32)
-        if len(self._lookups) > 1000:  # tuples made anew for every message
-            self._lookups.clear()
-        self._lookups[id(names)] = names, lookup
-        if len(self._code) > len(self.names):
-            self.names = tuple(self._code)
-        return lookup
 
 
 def _values(values: Any, kind: str, count: int) -> AnyArray:
