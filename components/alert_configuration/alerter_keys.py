@@ -66,7 +66,7 @@ class AlerterKeys:
         prefixes = {name: name.lower() + "_" for name in sorted(names, key=len, reverse=True)}
         self._beginnings = {prefix: name + "_" for name, prefix in prefixes.items()}
         result = {name: self._alerter(name, prefix, number) for name, prefix in prefixes.items()}
-        self._leave_out(tuple(prefixes.values()))
+        self._ignore_alerters(tuple(prefixes.values()))
         for name, prefix in prefixes.items():
             self._note_idle_detectors(name, prefix)
         self._note_unknown()
@@ -82,7 +82,7 @@ class AlerterKeys:
         if not of_level:
             self._problems.add(
                 f"the alerter {shortened(name)!r} has no levels: {name}_alert_1_detector and "
-                f"others are needed{did_you_mean(name, self._others(prefix))}",
+                f"others are needed{did_you_mean(name, self._other_alerters(prefix))}",
                 line=named_in,
             )
             return None
@@ -228,7 +228,7 @@ class AlerterKeys:
             self._problems.add(f"{name} {error}", line=number)
             return None
 
-    def _leave_out(self, named: tuple[str, ...]) -> None:
+    def _ignore_alerters(self, named: tuple[str, ...]) -> None:
         """Ignore the keys of whole alerters other than those with the prefixes `named`."""
         free = self._lines.keys() - self._used
         result: dict[str, str] = {}
@@ -244,7 +244,7 @@ class AlerterKeys:
             self._used |= {k for k in free if k.startswith(prefix) and not k.startswith(longer)}
         self.left_out = tuple(sorted(result.values()))
 
-    def _others(self, prefix: str) -> list[str]:
+    def _other_alerters(self, prefix: str) -> list[str]:
         """Return the names of what looks like alerters but those with a prefix."""
         found = {
             self._lines[key][1][: match.end(1)]
@@ -275,7 +275,7 @@ class AlerterKeys:
         for key in sorted(self._lines.keys() - self._used, key=lambda key: self._lines[key][0]):
             number, name, _ = self._lines[key]
             shown = shortened(name, 3 * MOST_OF_A_CELL)
-            if hint := self._meant(key):
+            if hint := self._nearest_key(key):
                 said = f"the key {shown!r} is unknown; did you mean {hint!r}?"
                 self._problems.add(said, line=number)
             else:
@@ -286,7 +286,7 @@ class AlerterKeys:
             names = ", ".join(f"{shown} (line {number})" for number, shown in strange)
             self._problems.add(f"{len(strange)} keys are unknown: {names}")
 
-    def _meant(self, key: str) -> str | None:
+    def _nearest_key(self, key: str) -> str | None:
         """Return the key that a misspelt one stands for, of those that the file lacks."""
         free = {k: shown for k, shown in self._expected.items() if k not in self._lines}
         for begin in sorted(self._beginnings, key=len, reverse=True):

@@ -49,7 +49,7 @@ def alert_files(
     decimals: int,
 ) -> None:
     """Write the tables and figures that the command line asks for."""
-    paths, several = _found(encounters)
+    paths, several = _list_encounter_files(encounters)
     names = {"--out": out, "--figure": figure, "--bands": bands}
     places = {option: named(name, option) for option, name in names.items() if name is not None}
     for (option, path), (other, its) in combinations(places.items(), 2):
@@ -62,7 +62,7 @@ def alert_files(
             if option == "--figure":
                 check_ending(path, PICTURES, option)
             check_file(path, option)
-    configuration = _read(Path(conf))
+    configuration = _read_configuration(Path(conf))
     if no_hysteresis:
         configuration = without_memory(configuration)
     own = None if own_file is None else Path(own_file)
@@ -81,7 +81,7 @@ def alert_files(
     _show(configuration, done, places)
 
 
-def _found(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
+def _list_encounter_files(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
     """Return the files that are named, those of folders sorted, and whether they may be several."""
     result: list[Path] = []
     several = len(encounters) > 1
@@ -106,7 +106,7 @@ def _found(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
     return result, several
 
 
-def _read(path: Path) -> Configuration:
+def _read_configuration(path: Path) -> Configuration:
     try:
         return read_conf(path)
     except TrafficFileError as error:

@@ -202,7 +202,7 @@ def _levels(count: int) -> Callable[[], object]:
     configuration = read_conf(folder() / "alerting" / "do365b.conf")
     levels, lookahead_s = configuration.alerters[0].levels, configuration["lookahead_time"]
     own, intruder = states(count, 10_000.0, 200.0, 1)
-    relative = own.less(intruder)
+    relative = own.relative_to(intruder)
     return lambda: due_levels(levels, violation_times_s(levels, relative, lookahead_s, None))
 
 

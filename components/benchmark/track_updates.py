@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 import dsa_des
-from components.estimation.batched import product, product_transposed
+from components.estimation.batched import multiply_by_transpose, product
 from components.estimation.frame import SensorPose, pose_in_frame
 from components.estimation.measurement import position_of
 from components.tracking.filters import ExtendedKalman
@@ -279,7 +279,7 @@ def _stone_soup_tracker(intensity: float, speed_m_s: float) -> Any:
 
 
 def _looks(block: Listening) -> tuple[Scans, SensorPose]:
-    scans = Scans.joined([scans_of(wake["fused"]) for wake in block.kept])
+    scans = Scans.concatenate([scans_of(wake["fused"]) for wake in block.kept])
     origin = scans.pose[:3, :1]
     lat, lon, alt = (np.repeat(value, len(scans)) for value in origin)
     pose = scans.pose
@@ -312,7 +312,7 @@ def _started(
     spread = np.zeros((3, 3, len(which)))
     for i in range(3):
         spread[i, i] = scans.variance[i, which]
-    turned = product_transposed(product(slope, spread), slope)
+    turned = multiply_by_transpose(product(slope, spread), slope)
     states, covariances = [], []
     for k in which.tolist():
         states.append(np.concatenate([position[:, k], np.zeros(3)]))

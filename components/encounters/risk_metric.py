@@ -17,7 +17,7 @@ from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class,
 from components.metrics.losses import meeting_deg, nominal_geometry
 from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import traffic_block
-from components.well_clear.missed_cylinder import Missed, led_into, widened
+from components.well_clear.missed_cylinder import Missed, probability_led_into, widen_cylinders
 from components.well_clear.plane_pairs import Meetings, meetings
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.scene.block_table import Block
@@ -199,7 +199,7 @@ class RiskRatios(Mitigated):
         meeting, sizes_m = met_in_plane(group, self.p), self.p.sizes_m
         if meeting is None:
             result = self._of_nominal(group)
-            geometry = partial(nominal_geometry, widened(sizes_m))
+            geometry = partial(nominal_geometry, widen_cylinders(sizes_m))
             closest, *misses_m = np.split(self.of_flights(group, geometry, steered=False), [7, 9])
         else:
             closest, result = meeting.closest, self._of_meeting(meeting)
@@ -228,7 +228,9 @@ class RiskRatios(Mitigated):
         for k, event in enumerate(("well_clear_lost", "nmac")):
             there = result[f"{event}_nominal"] > 0.0
             missed = Missed(values[1], values[2], misses_m[0][k], misses_m[1][k])
-            induced = _INDUCED * rushed * led_into(sizes_m[k], missed, climbs=self._climbs)
+            induced = (
+                _INDUCED * rushed * probability_led_into(sizes_m[k], missed, climbs=self._climbs)
+            )
             stays = _STAYS + (1.0 - _STAYS) * late
             result[expected_column(f"{event}_mitigated")] = np.where(there, stays, induced)
         alone = np.maximum(np.nan_to_num(clear, nan=np.inf), 1.0)
@@ -315,4 +317,4 @@ def met_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
     ):
         return None
     paths, end_s = pair_paths(encounters_of(group), one.dynamics), float(scene.duration_s or "inf")
-    return meetings(paths, len(group), end_s, p.sizes_m, widened(p.sizes_m))
+    return meetings(paths, len(group), end_s, p.sizes_m, widen_cylinders(p.sizes_m))

@@ -65,7 +65,7 @@ class Fleet(Sequence[Any]):
         """Return the states of all at times (n,), shape (n, flights)."""
         times, count = checked_times(time_s), len(self)
         aircraft = np.tile(np.arange(count), len(times))
-        return self.each(aircraft, np.repeat(times, count)).reshaped((len(times), count))
+        return self.each(aircraft, np.repeat(times, count)).reshape((len(times), count))
 
     def subset(self, columns: IntArray) -> Fleet:
         """Return the fleet of some flights, given by their indices, ascending."""
@@ -85,7 +85,7 @@ def in_blocks(
     if len(blocks) == 1:
         return blocks[0]
     if not blocks:
-        return empty_state(1, 0).reshaped((0,))
+        return empty_state(1, 0).reshape((0,))
     columns = zip(*(block.arrays() for block in blocks), strict=True)
     return TrajectoryState(*(np.concatenate(parts) for parts in columns))
 
@@ -108,7 +108,7 @@ def empty_state(rows: int, columns: int) -> TrajectoryState:
 def in_rows(rows: Sequence[IntArray], states: Sequence[TrajectoryState]) -> TrajectoryState:
     """Return states (n,) put together, those of each part in the rows that it has."""
     if not states:
-        return empty_state(1, 0).reshaped((0,))
+        return empty_state(1, 0).reshape((0,))
     order = np.argsort(np.concatenate(rows), kind="stable")
     columns = zip(*(state.arrays() for state in states), strict=True)
     return TrajectoryState(*(np.concatenate(parts)[order] for parts in columns))

@@ -15,8 +15,8 @@ from components.geometry import (
     TWO_PI,
     local_axes,
     normal_to_degrees,
-    past,
     radii_of_curvature,
+    remainder,
     wrap_heading_rad,
 )
 from dsa_des.arrays.types import FloatArray
@@ -246,7 +246,7 @@ def hold_state(
     """Evaluate aircraft that stay in one position; see `Segment` for the table's rows."""
     zero = np.zeros_like(elapsed)
     # Reduced before the sum, so that hours of turning keep their digits and stay in [0, 2 pi).
-    yaw = past(table[4] + table[5] * elapsed, TWO_PI)
+    yaw = remainder(table[4] + table[5] * elapsed, TWO_PI)
     return zero + table[0], zero + table[1], table[2] + table[3] * elapsed, yaw
 
 

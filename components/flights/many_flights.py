@@ -231,7 +231,7 @@ class SteeredFleet(Fleet):
         """Return where ownships are around times (n,), as at `times_around_s`, (n, 3)."""
         times_s = times_around_s(time_s)
         around = self.each(np.repeat(ownship, times_s.shape[1]), times_s.reshape(-1))
-        return around.reshaped(times_s.shape)
+        return around.reshape(times_s.shape)
 
     def _ramps(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> ScriptedFleet:
         """Return what ownships fly from their velocities at times (n,) to commanded ones."""
@@ -325,7 +325,7 @@ class SteeredFlight:
         times = np.asarray(time_s, dtype=np.float64)
         flat = times.reshape(-1)
         state = self._fleet.each(np.full(len(flat), self._number), flat)
-        return state.reshaped(times.shape)
+        return state.reshape(times.shape)
 
 
 class MixedFleet(Fleet):

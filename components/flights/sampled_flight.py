@@ -220,7 +220,7 @@ class SampledTrajectory:
         if self.away is not None:
             present &= ~self.away[segment] | (elapsed == 0.0)
         state = evaluate_segments(self.coefficients[:, segment], elapsed, present)
-        return state.reshaped(times.shape)
+        return state.reshape(times.shape)
 
     def interval_present(self) -> tuple[float, float]:
         """Return the times of the first and the last sample, both included."""
@@ -300,7 +300,7 @@ class SampledFleet(Fleet):
                 present &= ~self._away[index] | (elapsed == 0.0)
             values = evaluate_segments(
                 self._segments(index.reshape(-1)), elapsed.reshape(-1), present.reshape(-1)
-            ).reshaped(shape)
+            ).reshape(shape)
             for out, value in zip(state.arrays(), values.arrays(), strict=True):
                 out[block] = value
         return state

@@ -145,7 +145,7 @@ class ScriptedTrajectory:
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give the aircraft's state at some times."""
         times = np.asarray(time_s, dtype=np.float64)
-        return self.as_fleet.at(times.reshape(-1)).reshaped(times.shape)
+        return self.as_fleet.at(times.reshape(-1)).reshape(times.shape)
 
     @property
     def max_speed_mps(self) -> float:
@@ -266,7 +266,7 @@ class ScriptedFleet(Fleet):
         if len(others):
             shape = len(times), len(others)
             aircraft = np.broadcast_to(others, shape).reshape(-1)
-            several = self.each(aircraft, np.repeat(times, len(others))).reshaped(shape)
+            several = self.each(aircraft, np.repeat(times, len(others))).reshape(shape)
             parts.append((others, several))
         if len(parts) == 1:
             return parts[0][1]

@@ -196,8 +196,8 @@ def north_east_up(
     dlat = lat2 - lat1  # rounds, but relative to itself: nothing is wrapped afterwards
     dlat *= 0.5
     sin_half = np.sin(dlat * RAD_PER_DEG)
-    cos_half = _cos_beside(sin_half, dlat)
-    cos2 = _cos_of_other(lat2, sin1, cos1, sin_half, cos_half)
+    cos_half = _cosine_from_sine(sin_half, dlat)
+    cos2 = _cosine_of_target(lat2, sin1, cos1, sin_half, cos_half)
 
     # sin(lat2) - sin(lat1); the cosine of the mean latitude may lose relative accuracy at the
     # pole, but here it is only ever multiplied by something of the size of the offset.
@@ -229,7 +229,7 @@ def north_east_up(
     dlon = longitude_difference_rounded(lon1, lon2)
     dlon *= 0.5
     sin_half_lon = np.sin(dlon * RAD_PER_DEG)
-    cos_half_lon = _cos_beside(sin_half_lon, dlon)
+    cos_half_lon = _cosine_from_sine(sin_half_lon, dlon)
 
     across = n2 * cos2
     across = across * sin_half_lon
@@ -250,7 +250,7 @@ def north_east_up(
     return north, east, up
 
 
-def _cos_beside(sine: FloatArray, angle_deg: FloatArray) -> FloatArray:
+def _cosine_from_sine(sine: FloatArray, angle_deg: FloatArray) -> FloatArray:
     """Cosine of degrees in ±90 whose sine is known: a square root where it loses nothing."""
     cosine = 1.0 - sine
     cosine *= 1.0 + sine
@@ -261,7 +261,7 @@ def _cos_beside(sine: FloatArray, angle_deg: FloatArray) -> FloatArray:
     return cosine
 
 
-def _cos_of_other(
+def _cosine_of_target(
     lat2: FloatArray, sin1: FloatArray, cos1: FloatArray, sin_half: FloatArray, cos_half: FloatArray
 ) -> FloatArray:
     """Cosine of the target's latitude, from ours and half the difference where nothing cancels."""

@@ -32,15 +32,15 @@ __all__ = [
 
 def target_share(area_m2: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
     """Return the share of the beam's disc that a target which shows an area fills."""
-    return _filled("area_m2", area_m2, range_m, divergence_rad, 2)
+    return _filled_beam_share("area_m2", area_m2, range_m, divergence_rad, 2)
 
 
 def wire_share(diameter_m: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
     """Return the share of the beam's disc that a wire through its middle fills: 4 d / (π θ R)."""
-    return _filled("diameter_m", diameter_m, range_m, divergence_rad, 1)
+    return _filled_beam_share("diameter_m", diameter_m, range_m, divergence_rad, 1)
 
 
-def _filled(
+def _filled_beam_share(
     name: str, size: ArrayLike, range_m: ArrayLike, divergence_rad: float, power: int
 ) -> Any:
     shape, (filled, distance) = broadcast_flat(

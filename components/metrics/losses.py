@@ -28,7 +28,7 @@ from components.metrics.separation import (
     position_of,
 )
 from components.well_clear.separation import first_inside_cylinder
-from components.well_clear.volume import Volume, inside_cylinder, violation_span
+from components.well_clear.volume import Volume, is_inside_cylinder, violation_span
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -58,7 +58,9 @@ def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
     result = [float("nan")] * len(limits_m)
     for piece in flight.pieces():
         for number, (horizontal_m, vertical_m) in enumerate(limits_m):
-            inside = inside_cylinder(piece.horizontal_m, piece.vertical_m, horizontal_m, vertical_m)
+            inside = is_inside_cylinder(
+                piece.horizontal_m, piece.vertical_m, horizontal_m, vertical_m
+            )
             if np.isnan(result[number]) and inside.any():
                 result[number] = float(piece.time_s[np.argmax(inside)])
         if not np.isnan(result).any():

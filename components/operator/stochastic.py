@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.flights.point_mass import LEAST_EASING_S
-from components.guidance.daidalus import ConfParameters, changes_out, why_never_steers
+from components.guidance.daidalus import ConfParameters, changes_out_of_bands, explain_no_steering
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.operator.pilot_model import Draws, mean_pause_s, pause_s, response_s, steering
@@ -154,7 +154,7 @@ class Stochastic(Component):
 
     def warnings(self) -> list[str]:
         """Say why it never steers, where that is so."""
-        return why_never_steers(
+        return explain_no_steering(
             self.p.level, self._configuration, self._alerter, self.context.producers
         )
 
@@ -289,7 +289,7 @@ class Stochastic(Component):
                 if not rows:
                     continue
                 kind = "hdir" if turns else "alt"
-                every = changes_out(kind, self._configuration, self._alerter, alerts, rows)
+                every = changes_out_of_bands(kind, self._configuration, self._alerter, alerts, rows)
                 for row, changes in zip(rows, every, strict=True):
                     change = 0.0
                     if changes is not None:

@@ -56,7 +56,7 @@ MESH_ROWS = 64
 
 
 @lru_cache(maxsize=256)
-def sampled_table(
+def silhouette_table_of_bodies(
     front_m2: float, side_m2: float, horizontal_m2: float, back_m2: float | None = None
 ) -> SilhouetteTable:
     """Return the silhouette of the union of the three bodies at every 5 degrees of aspect."""
@@ -151,7 +151,7 @@ def check_silhouette(roster: Roster, band: str, silhouette: str) -> None:
                 )
 
 
-def fitted_otherwise(roster: Roster, band: str, silhouette: str) -> list[str]:
+def warn_of_other_fits(roster: Roster, band: str, silhouette: str) -> list[str]:
     """Warn of targets whose areas were fitted as a union and that are shown as single bodies."""
     if silhouette not in ("exact", "thesis"):
         return []
@@ -177,7 +177,10 @@ def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
     names = (*_BODIES, "back_m2") if band == "ir" else _BODIES
     areas = {name: cells.roster.column(f"{band}.{name}") for name in names}
     if silhouette == "sampled_table":
-        tables = [sampled_table(*map(float, row)) for row in zip(*areas.values(), strict=True)]
+        tables = [
+            silhouette_table_of_bodies(*map(float, row))
+            for row in zip(*areas.values(), strict=True)
+        ]
         return area_by_table(cells, {"table": tables}, "aspect_table")
     if silhouette == "mesh":
         check_silhouette(cells.roster, band, silhouette)

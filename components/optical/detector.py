@@ -13,12 +13,12 @@ from components.arguments.checks import not_negative, positive
 from components.optical.contrast import CONTRAST, visibility_transmission
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
-    deviations_exceeded,
+    deviations_of_exceedance,
     exceeding_probability,
 )
 from components.optical.infrared_area import AREA
 from components.optical.signature import SIGNATURE, pixels_of_cells
-from components.optical.weather_effects import own_band
+from components.optical.weather_effects import infrared_band_of
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.component import Parameters
 
@@ -86,7 +86,7 @@ class CameraCalibration(Parameters):
     )
 
     @model_validator(mode="after")
-    def _of_one_target(self) -> Self:
+    def _check_one_target(self) -> Self:
         if (self.area_m2 is None) == (self.aircraft is None):
             raise ValueError("exactly one of area_m2 and aircraft must be given")
         if self.area_m2 is not None and self.aspect_deg:
@@ -106,7 +106,7 @@ class CameraDetector:
     false_alarms: float  # Expected in a frame
 
 
-def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetector:
+def settle_detector(camera: Any, places: int, noise_of_contrast: float) -> CameraDetector:
     """Return a camera's detector: what the scene leaves open follows from what it states.
 
     Any two of threshold, noise, false alarms and a known range give the others.
@@ -117,7 +117,7 @@ def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetecto
     if contrast == 0.0:  # the thesis's rule, beside which a rate of false alarms may be stated
         level = 1.0 if threshold is None else threshold
         rate = alarms or 0.0
-        noise = level / _crossed(rate, places) if level > 0.0 and rate > 0.0 else 1.0
+        noise = level / threshold_deviations(rate, places) if level > 0.0 and rate > 0.0 else 1.0
         return CameraDetector(level, 0.0, noise, places, rate)
     given = sum(one is not None for one in (threshold, contrast, alarms, known))
     if given == 0 or (given == 1 and alarms is not None):
@@ -130,12 +130,12 @@ def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetecto
         )
     noise = None if contrast is None else noise_of_contrast * contrast
     if known is not None:
-        signature = known_signature(camera, known)
-        above = -deviations_exceeded(known.pd)
+        signature = calibrated_signature(camera, known)
+        above = -deviations_of_exceedance(known.pd)
         if noise is not None:
             threshold = signature - above * noise
         elif alarms is not None:
-            crossed = _crossed(alarms, places)
+            crossed = threshold_deviations(alarms, places)
             if not above + crossed > 0.0:
                 raise ValueError(
                     f"calibrate.pd is {known.pd:g}: noise alone is detected more often, with "
@@ -160,19 +160,19 @@ def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetecto
             )
     elif threshold is None:
         assert noise is not None and alarms is not None
-        threshold = noise * _crossed(alarms, places)
+        threshold = noise * threshold_deviations(alarms, places)
     elif noise is None:
         assert alarms is not None
         if threshold <= 0.0:  # whatever there is is seen: nothing is known of the noise
             return CameraDetector(threshold, 0.0, 1.0, places, alarms)
-        noise = threshold / _crossed(alarms, places)
+        noise = threshold / threshold_deviations(alarms, places)
     if noise == 0.0:
         return CameraDetector(threshold, 0.0, 1.0, places, 0.0)
     rate = places * exceeding_probability(threshold / noise)
     return CameraDetector(threshold, noise, noise, places, rate)
 
 
-def _crossed(false_alarms: float, places: int) -> float:
+def threshold_deviations(false_alarms: float, places: int) -> float:
     """Return how many standard deviations the threshold lies above noise; infinite for none."""
     if false_alarms == 0.0:
         return math.inf
@@ -181,7 +181,7 @@ def _crossed(false_alarms: float, places: int) -> float:
             f"false_alarms_per_frame is {false_alarms:g}: it must be below {0.5 * places:g}, half "
             f"of the {places:,} places for them in a frame"
         )
-    return deviations_exceeded(false_alarms / places)
+    return deviations_of_exceedance(false_alarms / places)
 
 
 class _OneLook:
@@ -197,11 +197,11 @@ class _OneLook:
     def __len__(self) -> int:
         return 1
 
-    def of_target(self, column: FloatArray) -> AnyArray:
+    def target_values(self, column: FloatArray) -> AnyArray:
         return column[self.craft]
 
 
-def known_signature(camera: Any, known: CameraCalibration) -> float:
+def calibrated_signature(camera: Any, known: CameraCalibration) -> float:
     """Return the signature of the target whose probability of detection is known."""
     craft = known.aircraft
     if craft is None:  # a sphere shows the same to all sides
@@ -219,9 +219,10 @@ def known_signature(camera: Any, known: CameraCalibration) -> float:
     )
     contrast = camera.contrast(cells) if known.contrast is None else np.full(1, known.contrast)
     if known.visibility_km is not None:
-        if own_band(camera) is not None:
+        if infrared_band_of(camera) is not None:
             raise ValueError(
-                f"calibrate.visibility_km is given and extinction_band is {own_band(camera)!r}: "
+                "calibrate.visibility_km is given and extinction_band is "
+                f"{infrared_band_of(camera)!r}: "
                 "that band's air is another; give the contrast that is left (calibrate.contrast)"
             )
         contrast = contrast * visibility_transmission(range_m, 1000.0 * known.visibility_km)

@@ -35,7 +35,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     the reference.
     """
     camera: Any = block
-    if not hasattr(camera, "shown_area"):
+    if not hasattr(camera, "visible_area_m2"):
         as_camera: Any = reference
 
         def values(cells: Cells) -> dict[str, FloatArray]:
@@ -51,7 +51,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     else:
 
         def values(cells: Cells) -> dict[str, FloatArray]:
-            return {_AREA.name: camera.shown_area(cells)}
+            return {_AREA.name: camera.visible_area_m2(cells)}
 
     return dict(over_cells(camera, wake, values))
 
@@ -72,7 +72,7 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
         wide = [array.astype(np.longdouble) for array in (*turned_to_sight(cells), *bodies)]
         areas: Any = (*wide, None)[:8]
         exact = union_area(*areas)
-        error = np.abs(camera.shown_area(cells).astype(np.longdouble) - exact)
+        error = np.abs(camera.visible_area_m2(cells).astype(np.longdouble) - exact)
         return {_AREA.name: error.astype(np.float64)}
 
     found = over_cells(camera, wake, values)
@@ -299,7 +299,7 @@ class CameraBoundaryParameters(SensorParameters):
     )
 
     @model_validator(mode="after")
-    def _errs_by_chance(self) -> Self:
+    def _check_error_model(self) -> Self:
         if self.range_bias_share and not self.range_error_share:
             raise ValueError(
                 f"range_bias_share is {self.range_bias_share:g} and range_error_share is 0: no "

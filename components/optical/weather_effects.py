@@ -37,8 +37,8 @@ class Visibility(Effect[CellValues]):
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather]`` for a visibility, fog or rain."""
         weather = block.context.sections["weather"]
-        if own_band(block) is not None:
-            return Verdict(False, f"{_band_said(block)}: the air takes what it takes there")
+        if infrared_band_of(block) is not None:
+            return Verdict(False, f"{_describe_band(block)}: the air takes what it takes there")
         if weather.visibility_km is not None:
             return Verdict(True, f"[weather] visibility_km is {weather.visibility_km:g}")
         found = [
@@ -56,7 +56,7 @@ class Visibility(Effect[CellValues]):
     def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's contrast."""
         visibility_m = scene_visibility_m(block.context.sections["weather"])
-        if visibility_m is None or own_band(block) is not None:
+        if visibility_m is None or infrared_band_of(block) is not None:
             return lambda cells: np.ones(len(cells))
 
         def factor(cells: Cells) -> FloatArray:
@@ -73,11 +73,11 @@ class BandExtinction(Effect[CellValues]):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``extinction_band``."""
-        return Verdict(own_band(block) is not None, _band_said(block))
+        return Verdict(infrared_band_of(block) is not None, _describe_band(block))
 
     def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's contrast."""
-        band = own_band(block)
+        band = infrared_band_of(block)
         if band is None:
             return lambda cells: np.ones(len(cells))
         weather = block.context.sections["weather"]
@@ -118,11 +118,11 @@ class Night(Effect[bool]):
         return True
 
 
-def _band_said(block: Any) -> str:
+def _describe_band(block: Any) -> str:
     return f"extinction_band is {block.p.extinction_band!r}"
 
 
-def own_band(block: Any) -> str | None:
+def infrared_band_of(block: Any) -> str | None:
     """Return the infrared band of a camera whose air is that of its band, or None."""
     band = getattr(block.p, "extinction_band", None)
     return band if band in BANDS else None

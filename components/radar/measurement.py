@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from components.arguments.checks import not_negative, positive
-from components.geometry import NEAR_A_POLE_DEG, turned_by_meridians
+from components.geometry import NEAR_A_POLE_DEG, rotate_to_meridian
 from components.messages.columns import OWN_VELOCITY
 from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.targets import RelativeTargets, own_velocity
@@ -285,4 +285,4 @@ def _from_believed_north(
     if not (np.abs(place[0]) > NEAR_A_POLE_DEG).any():
         return velocity
     own = flights.own_at(row, time_s)
-    return turned_by_meridians(velocity, (own.lat_deg, own.lon_deg), place)
+    return rotate_to_meridian(velocity, (own.lat_deg, own.lon_deg), place)

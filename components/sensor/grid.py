@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry import TWO_PI, past, rising_sector, wrap_pi
+from components.geometry import TWO_PI, remainder, rising_sector, wrap_pi
 from dsa_des.arrays.column_values import constant, nothing_in
 from dsa_des.arrays.types import FloatArray
 
@@ -263,5 +263,5 @@ class SensorGrid:
         if low >= -math.pi and high <= math.pi:
             return self._azimuth_grid.round(azimuth_rad)
         # The field runs across ±pi: unwrap into it, so that its edges are its limits.
-        unwrapped = np.clip(low + past(azimuth_rad - low, TWO_PI), low, high)
+        unwrapped = np.clip(low + remainder(azimuth_rad - low, TWO_PI), low, high)
         return wrap_pi(self._azimuth_grid.round(unwrapped))

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from components.estimation.frame import SensorPose, pose_in_frame
-from components.estimation.measurement import Kind, linearised
+from components.estimation.measurement import Kind, linearise
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.fused import FusedDetections
@@ -19,7 +19,7 @@ from components.stone_soup.library import Repeatable, needs_stone_soup
 from components.tracking.out_of_sequence import LookCount, latest_s
 from components.tracking.promises import ACTS_EVERY_S, Promises
 from components.tracking.reported_errors import unknown_latency
-from components.tracking.scans import Scans, scans_of, when_made
+from components.tracking.scans import Scans, scans_of, split_due_looks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
@@ -161,7 +161,7 @@ class StoneSoupTracker(Component):
             in_time = False
             for look, pose in due.get(row, ()):
                 if look.tick[0] < self._newest:
-                    self._count = self._count.of(self._sensors, look, slice(0), [0])
+                    self._count = self._count.with_looks(self._sensors, look, slice(0), [0])
                     continue
                 in_time = True
                 here |= {one.number: one for one in self._looked(look, pose, wake)}
@@ -182,12 +182,12 @@ class StoneSoupTracker(Component):
             self._sensors = fused.sensors
             came = scans_of(fused)
             came = replace(came, row=np.flatnonzero(~wake.idle)[came.row])
-            self._count = self._count.of(fused.sensors, came, slice(None), [])
+            self._count = self._count.with_looks(fused.sensors, came, slice(None), [])
         elif self._ahead is not None:
             came = self._ahead.take(np.zeros(0, dtype=np.int64))
         else:
             return {}
-        scans, self._ahead = when_made(came, self._ahead, wake, self._wait_ticks)
+        scans, self._ahead = split_due_looks(came, self._ahead, wake, self._wait_ticks)
         due: dict[int, list[tuple[Scans, SensorPose]]] = {}
         if len(scans):
             if self._origin is None:
@@ -245,7 +245,7 @@ class StoneSoupTracker(Component):
             own_m,
             np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2),
         )
-        seen, by_state = linearised(Kind(False), state, at)
+        seen, by_state = linearise(Kind(False), state, at)
         angular = np.einsum("ikn,kln,iln->in", by_state, spread[:3, :3], by_state)
         ranged = np.array([one.ranged for one in tracks], dtype=bool)
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from components.aircraft.equipage import Equipage
 from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
-from components.geometry import NEAR_A_POLE_DEG, level_parts, turned_by_meridians
+from components.geometry import NEAR_A_POLE_DEG, level_parts, rotate_to_meridian
 from components.navigation.errors import displaced_position
 from components.sensor.look import Cells
 from components.surveillance.altimetry import altimetry_error_ft, standard_laplace
@@ -172,7 +172,7 @@ class Broadcasts:
         )  # fmt: skip
         none = np.zeros_like(errors[0])
         lat, lon, _ = displaced_position(*true, sent.alt_m[which], *errors, none)
-        return turned_by_meridians(moved, true, (lat, lon))
+        return rotate_to_meridian(moved, true, (lat, lon))
 
     def position(
         self, equipage: Equipage, transponders: Transponders, sent: Sent
@@ -216,5 +216,5 @@ def velocity_in_axes_at(
     for _ in range(3):
         back = np.nan_to_num(turned * -later_s)
         lat, lon, _ = displaced_position(*position, *back)
-        turned = turned_by_meridians(north_east_down, (lat, lon), (position[0], position[1]))
+        turned = rotate_to_meridian(north_east_down, (lat, lon), (position[0], position[1]))
     return turned

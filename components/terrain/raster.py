@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
-from components.geometry import RAD_PER_DEG, past, radii_of_curvature
+from components.geometry import RAD_PER_DEG, radii_of_curvature, remainder
 from components.terrain.voids import MOST_VOIDS, filled_voids
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
@@ -125,7 +125,7 @@ class ElevationRaster:
         # Whichever turn the longitude is given in; what lies a rounding west of the first column
         # is on it.
         edge = _EDGE * self.lon_step_deg
-        return v, (past(lon_deg - self.west_deg + edge, 360.0) - edge) / self.lon_step_deg
+        return v, (remainder(lon_deg - self.west_deg + edge, 360.0) - edge) / self.lon_step_deg
 
     def height(
         self, lat_deg: FloatArray, lon_deg: FloatArray

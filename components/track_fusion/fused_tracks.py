@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from components.estimation.batched import product, product_transposed, times
-from components.estimation.covariance_intersection import Rule, intersected, inverse
+from components.estimation.batched import multiply_by_transpose, product, times
+from components.estimation.covariance_intersection import Rule, intersect_covariances, inverse
 from components.estimation.frame import SensorPose
-from components.estimation.measurement import Kind, linearised
+from components.estimation.measurement import Kind, linearise
 from components.estimation.motion import ConstantVelocity
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.state_tracks import (
@@ -55,7 +55,7 @@ def fused_states(
                 weighed = angles.jacobian.swapaxes(0, 1) / angles.variance
                 information = product(weighed, angles.jacobian)
                 pull = times(weighed, angles.residual)
-            shift, result, _ = intersected(p[:, :, into], information, pull, rule)
+            shift, result, _ = intersect_covariances(p[:, :, into], information, pull, rule)
             x[:, into] += shift
             p[:, :, into] = result
     status = np.full(count, TENTATIVE)
@@ -130,8 +130,8 @@ def reported_after(
     born_s[known] = before.born_s[old[known]]
     contributors[known] |= before.contributors[old[known]]
     axes = np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2)
-    seen, by_state = linearised(Kind(False), fused.state, SensorPose(own_m, axes))
-    spread = product_transposed(product(by_state, fused.covariance[:3, :3]), by_state)
+    seen, by_state = linearise(Kind(False), fused.state, SensorPose(own_m, axes))
+    spread = multiply_by_transpose(product(by_state, fused.covariance[:3, :3]), by_state)
     newest = members.take(fused.newest)
     azimuth, elevation = newest.direction()
     state_s = np.where(ranged, fused.state_s, newest.time_s)

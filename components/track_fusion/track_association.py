@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.association.assignment import gate_threshold, global_nearest
-from components.estimation.batched import cholesky, distance_squared, product, product_transposed
-from components.estimation.measurement import Kind, linearised, residual
+from components.estimation.batched import cholesky, distance_squared, multiply_by_transpose, product
+from components.estimation.measurement import Kind, linearise, residual
 from components.estimation.motion import ConstantVelocity
 from components.track_fusion.local_tracks import LocalTracks
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -49,7 +49,7 @@ def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Beari
     back_s = tracks.time_s - time_s
     then = state.copy()
     then[:3] += back_s * state[3:]
-    seen, by_position = linearised(_DIRECTION, then, tracks.pose())
+    seen, by_position = linearise(_DIRECTION, then, tracks.pose())
     measured = np.stack([tracks.azimuth_rad, tracks.elevation_rad])
     return Bearing(
         residual(measured, seen),
@@ -80,7 +80,7 @@ def gate_share(
         when = np.concatenate([time_s[one & ~swap], time_s[swap]])
         x, p = mine.at(when, rules.motion)
         angles = bearing(theirs, x, when)
-        spread = product_transposed(product(angles.jacobian, p), angles.jacobian)
+        spread = multiply_by_transpose(product(angles.jacobian, p), angles.jacobian)
         for i in range(2):
             spread[i, i] += angles.variance[i]
         result = distance_squared(cholesky(spread), angles.residual) / two

@@ -95,7 +95,7 @@ class TrackerStub(Component):
 
     def run(self, wake: Wake) -> Tracks | None:
         """Take in new measurements and report what is held."""
-        fused, counts = self._measured(wake)
+        fused, counts = self._measured_entries(wake)
         if fused is None:
             return None
         updated = (counts if self.p.drop_after_s is None else counts + wake.idle).nonzero()[0]
@@ -129,7 +129,7 @@ class TrackerStub(Component):
         self._held = self._held.after(replica[begins], table, wake.first_run)
         return self._tracks(fused, wake, updated, targets, last, pool, first)
 
-    def _measured(self, wake: Wake) -> tuple[FusedDetections | None, IntArray]:
+    def _measured_entries(self, wake: Wake) -> tuple[FusedDetections | None, IntArray]:
         """Return what was measured of targets, and how many entries each row of the wake has."""
         busy = wake.without_idle()
         fused = self._nothing if busy is None else busy["fused"]

@@ -250,7 +250,7 @@ class FlownFlights:
         if viewer in self.intervals:
             near = self.intervals[viewer].holds(target, times, times)
             others = replace(others, present=others.present & near)
-        return looking, others.reshaped(shape)
+        return looking, others.reshape(shape)
 
     def own_states(
         self, run: IntArray, known: IntArray, time_s: FloatArray, viewer: int
@@ -264,7 +264,7 @@ class FlownFlights:
         mine = known[..., list(self.platforms).index(viewer)]
         runs, counts = (np.broadcast_to(of, time_s.shape).reshape(-1) for of in (run, mine))
         state = self.platform_at(viewer, runs, time_s.reshape(-1), counts)
-        return state.reshaped(time_s.shape)
+        return state.reshape(time_s.shape)
 
     def _published_s(self, run: IntArray, time_s: FloatArray) -> FloatArray:
         """Return the times of the last publications."""

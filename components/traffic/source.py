@@ -352,9 +352,9 @@ class TrafficSource(Component):
             state = self._moved[1].at(time_s)
             if not flown.crabbing and not flown.steered_targets:
                 return state
-            state = state.reshaped((-1,))
+            state = state.reshape((-1,))
         each = (run[:, np.newaxis] * flown.width + columns).reshape(-1)
-        return flown.targets_at(each, np.repeat(time_s, len(columns)), state).reshaped(shape)
+        return flown.targets_at(each, np.repeat(time_s, len(columns)), state).reshape(shape)
 
     def own_at(self, time_s: FloatArray) -> TrajectoryState:
         """Return the ownship's state, as it is known now, at times (n,), in wind."""

@@ -221,7 +221,7 @@ def test_velocities_of_looks_are_turned_into_the_axes_of_their_frames():
     measured = np.arange(21.0).reshape(7, 3)
     measured[:, 1] = np.nan
     looks = _Looks(measured, np.array([0, 1, 3]), np.vstack([place, np.zeros((3, 2))]))
-    turned = Scans.in_frame(looks, origin).measured
+    turned = Scans.rotate_to_frame(looks, origin).measured
     assert turned is not measured and np.array_equal(turned[:4], measured[:4], equal_nan=True)
     for entry, look in ((0, 0), (2, 1)):
         ecef = pymap3d.enu2uvw(*measured[[5, 4], entry], -measured[6, entry], *place[:2, look])
@@ -229,7 +229,7 @@ def test_velocities_of_looks_are_turned_into_the_axes_of_their_frames():
         assert turned[4:, entry] == pytest.approx([north, east, -up], abs=1e-6)
     assert np.isnan(turned[4:, 1]).all()
     silent = replace(looks, measured=np.full((7, 3), np.nan))
-    assert Scans.in_frame(silent, origin) is silent
+    assert Scans.rotate_to_frame(silent, origin) is silent
 
 
 @dataclass(frozen=True)
