@@ -197,7 +197,7 @@ class _OneLook:
     def __len__(self) -> int:
         return 1
 
-    def target_values(self, column: FloatArray) -> AnyArray:
+    def of_target(self, column: FloatArray) -> AnyArray:
         return column[self.craft]
 
 
