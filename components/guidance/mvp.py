@@ -15,6 +15,7 @@ from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.wake import Wake
+from dsa_des.record.undone import NO_COUNTS, with_cases
 
 # Within this of its goal an aircraft stays; it flies to it no faster than in a second.
 _AT_GOAL_M, _LAST_S = 0.5, 1.0
@@ -42,6 +43,14 @@ class PotentialParameters(Parameters):
         "of where it is first seen, m; by default it flies on for ever.",
     )  # fmt: skip
 
+    def without_effect(self) -> list[str]:
+        """Say that its own way is flown at the largest speed, where that is slower."""
+        said = super().without_effect()
+        if self.speed_mps <= self.most_mps:
+            return said
+        slower = f"most_mps is {self.most_mps:g}: it never flies its own way any faster"
+        return [*said, f"speed_mps is {self.speed_mps:g} and {slower}"]
+
 
 class VoltagePotential(Component):
     """Leads a multirotor out of conflicts by the modified voltage potential.
@@ -58,7 +67,7 @@ class VoltagePotential(Component):
     }
     outputs = {"manoeuvres": Output(Velocities, "Velocities that it is told to fly.")}
     Parameters = PotentialParameters
-    remembers = ("_known",)
+    remembers = ("_known", "_strange", "_unmoved")
     windowed = True
     lockstep = True
     rewindable = True
@@ -77,6 +86,15 @@ class VoltagePotential(Component):
         self._kept = KeptApart(self.p.radius_m, self.p.margin, self.p.lookahead_s)
         #: By run: which others are active, first track, goal, and the last velocity commanded.
         self._known = KeyedTable.empty({"replica": int})
+        #: How many entries are of no target, of how many; and how often its own velocity lacked.
+        self._strange, self._unmoved = NO_COUNTS, NO_COUNTS
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return whom it did not steer for, and how often it could not at all."""
+        return {
+            "a track is near no target and is not steered for": self._strange,
+            "its own velocity is not known yet and it does not steer": self._unmoved,
+        }
 
     def run(self, wake: Wake) -> Velocities | None:
         """Decide at every instant, of each run one after the other."""
@@ -84,6 +102,10 @@ class VoltagePotential(Component):
         if alerts is None or states is None:
             return None
         others, own_mps, heard = _dense(alerts)
+        of = wake.run[alerts.row_of_entries]
+        self._strange = with_cases(self._strange, of[alerts.target < 0], of)
+        some, still = heard.any(axis=1), np.isnan(own_mps[0])
+        self._unmoved = with_cases(self._unmoved, wake.run[some & still], wake.run[some])
         place = np.array([states.own_lat_deg, states.own_lon_deg, states.own_alt_m])
         commanded = np.full((2, len(wake)), math.nan)
         for rows in turns(wake.run):
@@ -97,15 +119,15 @@ class VoltagePotential(Component):
                 last_mps=np.full((2, len(rows)), math.nan),
             )
             known = self._known.continued(new) if len(self._known) else new
-            some = Others(*(part[:, rows] for part in others))
+            seen = Others(*(part[:, rows] for part in others))
             own = own_mps[:, rows]
-            now = conflicts(some, self._kept) & heard[rows]
-            done = may_resume(some, own, self._kept) | ~np.isfinite(own[0])[:, np.newaxis]
+            now = conflicts(seen, self._kept) & heard[rows]
+            done = may_resume(seen, own, self._kept) | ~np.isfinite(own[0])[:, np.newaxis]
             active = now | (known.active.T & ~(done & heard[rows]))
             velocity = self._undisturbed_velocity(known, place[:, rows])
             velocity = np.where(active.any(axis=1), own, velocity)
             with np.errstate(invalid="ignore"):
-                out = push_velocity(some, own, now, self._kept)
+                out = push_velocity(seen, own, now, self._kept)
             velocity = self._limit_speed(np.where(now.any(axis=1), out, velocity))
             # Nothing is told to who has not been steered, and flies its own way without it.
             silent = np.isnan(known.last_mps[0]) & ~active.any(axis=1) & (self.p.goal_m is None)

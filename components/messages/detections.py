@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from components.messages.looks import look_columns
 from components.messages.reach import Reach
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.column_values import picked
-from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Hook
 from dsa_des.block.message import (
     PER_ROW,
@@ -53,6 +53,10 @@ _SKIPPED = {
         "culled": "too far away for any sensor",
     }.items()
 }
+#: Index into the roster of a detection without a target; it is recorded as null.
+FALSE_TARGET = -1
+#: Extras that are instants, which a sensor stamps anew (`Detections.frozen`).
+_INSTANTS = ("illuminated_s", "reported_s", "velocity_s")
 #: Columns of ``detections`` that only some sensors fill. For others, a subclass has a field
 #: ``extras: dict[str, AnyArray] = columns({**EXTRAS, "name": Column("m", "", "meaning")}, ...)``.
 EXTRAS = {
@@ -283,6 +287,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     row_table = "scans"
     entry_table = "detections"
     may_hold = frozenset({"looks"})
+    may_stick = ("range_m", "azimuth_deg")
 
     scan: IntArray = column("", "", "number of the scan", "int64", of=PER_ROW, in_entries=True)
     evaluated: IntArray = column(
@@ -324,6 +329,39 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         for own in (self.own_of_entries, self.own_velocity_of_entries):
             tables["detections"].update(own or {})
         return tables if self.looks is None else {**tables, "looks": look_columns(self)}
+
+    def frozen(self, of: Self, source: IntArray, later_s: FloatArray) -> Self:
+        """Return its scans with detections of former ones: of nothing that is there now."""
+        result = super().frozen(of, source, later_s)
+        row = result.row_of_entries
+        old = (later_s > 0.0)[row]
+        result.target = np.where(old, FALSE_TARGET, result.target)
+        for name in TrueLine.__dataclass_fields__:
+            setattr(result, name, np.where(old, np.nan, getattr(result, name)))
+        result.extras = {
+            name: values + later_s[row] if name in _INSTANTS else values
+            for name, values in result.extras.items()
+        }
+        if result.own_of_entries is not None:  # the pose is none of the sensor's own values
+            result.own_of_entries = {
+                name: np.where(old, getattr(self, name)[row], values)
+                for name, values in result.own_of_entries.items()
+            }
+        return result
+
+    def with_stuck_bit(self, rows: BoolArray, quantity: str, worth: float) -> Self:
+        """Return the scans with one bit set of every range, or of every azimuth, clockwise."""
+        name, unit = "range_m", 1.0
+        if quantity == "azimuth_deg":
+            name, unit = "azimuth_rad", math.pi / 180.0
+        values = getattr(self, name)
+        unset = rows[self.row_of_entries] & (np.floor(values / (worth * unit)) % 2.0 == 0.0)
+        result = self._copy()
+        stuck = np.where(unset, values + worth * unit, values)
+        if quantity == "azimuth_deg":
+            stuck = np.where(stuck > math.pi, stuck - 2.0 * math.pi, stuck)
+        setattr(result, name, stuck)
+        return result
 
     def skipped_columns(self) -> dict[str, IntArray]:
         """Return how many targets were skipped, by column."""

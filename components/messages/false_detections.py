@@ -8,13 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.messages.columns import MEASURED
-from components.messages.detections import Detections
+from components.messages.detections import FALSE_TARGET, Detections
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.entries import offsets_of
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-
-#: Index into the roster of a detection without a target; it is recorded as null.
-FALSE_TARGET = -1
 
 
 def in_measured_order(detections: Detections) -> Detections:

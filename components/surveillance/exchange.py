@@ -5,14 +5,16 @@ import math
 import numpy as np
 from pydantic import Field
 
+from components.aircraft.known_targets import known_targets
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.alerts import AlertLevels
 from components.messages.reach import FarthestLook
 from components.messages.targets import TrafficStates
-from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Input, Output
 from dsa_des.block.message import offsets_of
 from dsa_des.block.wake import Wake
+from dsa_des.record.undone import NO_COUNTS, with_cases
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import target_keys
 
@@ -44,7 +46,7 @@ class PositionExchange(Component):
     inputs = {"states": Input(TrafficStates, "sampled", "Where all aircraft are.")}
     outputs = {"alerts": Output(AlertLevels, "Where the others say that they are, at level 0.")}
     Parameters = ExchangeParameters
-    remembers = ()
+    remembers = ("_still",)
     windowed = True
     lockstep = True
     rewindable = True
@@ -56,11 +58,29 @@ class PositionExchange(Component):
     def setup(self) -> None:
         """Make the draws, which are those of aircraft and not of who hears them."""
         self._errors = self.context.streams.stream("[exchange]", "fixes")
+        #: How often nobody could be heard as velocities were not known, of how many scans.
+        self._still = NO_COUNTS
+
+    def undone(self) -> dict[str, IntArray]:
+        """Return how often nothing moved as far as is known, as behind an FMU that flies."""
+        what = "no flights are known beside the positions: nobody has a velocity and is heard"
+        return {what: self._still}
+
+    def warnings(self) -> list[str]:
+        """Say that there is nobody to hear."""
+        rosters = known_targets(self.context)
+        alone = rosters and not any(map(len, rosters))
+        return ["nobody else flies: it hears of nobody"] if alone else []
 
     def run(self, wake: Wake) -> AlertLevels | None:
         """Give all fixes of every scan, relative to one's own."""
         states: TrafficStates | None = wake["states"]
-        if states is None or states.flights is None:
+        if states is None:
+            return None
+        self._still = with_cases(
+            self._still, wake.run[: len(wake) if states.flights is None else 0], wake.run
+        )
+        if states.flights is None:
             return None
         here = [np.stack([getattr(states, f"own_{name}") for name in POSITION_FIELDS])]
         here.append(np.stack([getattr(states, name) for name in POSITION_FIELDS]))

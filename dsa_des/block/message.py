@@ -14,7 +14,7 @@ import numpy as np
 from dsa_des.arrays.column_values import Columns, Text, nothing_in
 from dsa_des.arrays.entries import entries_of, offsets_of, row_of_entries
 from dsa_des.arrays.run_ticks import RunTicks, joined_runs, no_runs, says_no_runs
-from dsa_des.arrays.types import AnyArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.recorded_columns import (
     PER_ENTRY,
     PER_ROW,
@@ -131,6 +131,10 @@ class Message(_Found):
 
     #: Tables that `tables` may hold besides; other types declare them (`Component.also_records`).
     may_hold: ClassVar[frozenset[str]] = frozenset()
+
+    #: Quantities of which a bit may stick (`with_stuck_bit`), as a scene names them. A block that
+    #: sends a message without any cannot give wrong values.
+    may_stick: ClassVar[tuple[str, ...]] = ()
 
     #: Static fields that may differ between messages: `concatenate` brings them together.
     joins_static: ClassVar[frozenset[str]] = frozenset()
@@ -283,6 +287,29 @@ class Message(_Found):
         Every table has a column ``tick``, in order; by default what the fields declare.
         """
         return derived(type(self)).tables(self)
+
+    def frozen(self, of: Self, source: IntArray, later_s: FloatArray) -> Self:
+        """Return its rows with the entries of rows of another message, as if they were new.
+
+        Row i has those of row ``source[i]`` of the other, ``later_s[i]`` older; none where that is
+        below 0. What rows say besides stays.
+        """
+        offsets, index = entries_of(of.offsets, np.maximum(source, 0))  # type: ignore[attr-defined]
+        there = np.repeat(source >= 0, np.diff(offsets))
+        result = of.reordered(np.asarray(index)[there])
+        for name in (*_layout(type(self))[0], *_layout(type(self))[2]):
+            setattr(result, name, getattr(self, name))
+        result.run = self._runs()
+        kept = np.where(source >= 0, np.diff(offsets), 0)
+        result.offsets = np.concatenate(([0], np.cumsum(kept)))  # type: ignore[attr-defined]
+        return result
+
+    def with_stuck_bit(self, rows: BoolArray, quantity: str, worth: float) -> Self:
+        """Return the message with one bit of a quantity set in all entries of some rows.
+
+        `quantity` is one of `may_stick`, and `worth` what the bit is worth in its unit.
+        """
+        return self
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:

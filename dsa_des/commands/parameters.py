@@ -13,8 +13,9 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from dsa_des.block.registry import section_models
-from dsa_des.scene.block_table import BlockOptions, Outage, ProcessorParameters
+from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
 from dsa_des.scene.changes import may_change
+from dsa_des.stretches.outage import Outage
 
 _UNITS = {
     "hz": "Hz", "s": "s", "ms": "ms", "m": "m", "km": "km", "deg": "deg", "rad": "rad",

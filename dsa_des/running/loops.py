@@ -86,16 +86,17 @@ def _period_s(scene: Scene, edge: Edge) -> Fraction:
 def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> dict[str, int]:
     """Return the place of each block in the order in which blocks tell each other what they offer.
 
-    Requests go the other way. Both pass over wires with and without delay; loops are opened where
-    an input can be done without, and else at a delay.
+    Requests go the other way. Both pass over wires with and without delay; loops are opened at
+    their sources, which tell without having heard anything, else where an input can be done
+    without, and else at a delay.
     """
-    looped = in_cycles(graph)
+
+    def of_source(edge: Edge) -> bool:
+        return not any(port.required for port in classes[edge[1]].inputs.values())
+
     opened = nx.DiGraph(graph)
-    opened.remove_edges_from(
-        edge
-        for edge in graph.edges
-        if edge[0] in looped
-        and looped[edge[0]] == looped.get(edge[1])
-        and _optional(graph, classes, edge)
-    )
+    for opens in (of_source, lambda edge: _optional(graph, classes, edge)):
+        looped = in_cycles(opened)
+        inside = [e for e in opened.edges if looped.get(e[0], -1) == looped.get(e[1], -2)]
+        opened.remove_edges_from([edge for edge in inside if opens(edge)])
     return window_order(opened, set(graph), cut_loops(opened, classes))

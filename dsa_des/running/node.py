@@ -120,9 +120,10 @@ class Node:
     @property
     def things(self) -> list[object]:
         """All whose attributes hold its state."""
+        failing = [] if self.outages is None else [self.outages]
         if self.stretched is not None:
-            return self.stretched.things
-        return [self.component, *self.component.context.effects.values()]
+            return [*failing, *self.stretched.things]
+        return [*failing, self.component, *self.component.context.effects.values()]
 
     @property
     def wires(self) -> list[Channel]:
@@ -372,6 +373,8 @@ class Node:
         `ran` are the instants that it ran at; it sets out at `leaves`, where that is later.
         """
         for port, message in checked_messages(result, self.component.outputs, ran):
+            if self.outages is not None:
+                message = self.outages.sent(port, message)
             if isinstance(message, RunEnd):
                 self.simulation.runs.note_ends(message.instants, self.name)
             if self.simulation.recorder is not None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from dsa_des.block.component import Component, NonNegativeRational, Parameters, PositiveRational
 from dsa_des.scene.queue_policy import find_policy
@@ -71,39 +71,6 @@ class ProcessorParameters(Parameters):
     def _known(cls, name: Any) -> Any:
         find_policy(name)
         return name
-
-
-class Outage(Parameters):
-    """An item of ``outages``: times between failures and to repair are exponential."""
-
-    name: str | None = Field(
-        default=None, description="What fails, as its draws are keyed; by default its blocks."
-    )
-    blocks: tuple[str, ...] = Field(min_length=1, description="Blocks that are out together.")
-    mean_between_s: float = Field(
-        gt=0, description="Mean time from the start, or from being back, to the next failure, s."
-    )
-    mean_repair_s: float = Field(gt=0, description="Mean time from a failure to its repair, s.")
-    restart_s: float = Field(
-        default=0.0, ge=0, description="Time from the repair to the first output, s."
-    )
-
-    @property
-    def key(self) -> str:
-        """What its draws are keyed by."""
-        return self.name or ", ".join(self.blocks)
-
-    def sentence(self) -> str:
-        """Return, for example, ``radar, eo: out after 600 s up, for 23 s, on average``."""
-        out_s = self.mean_repair_s + self.restart_s
-        blocks = ", ".join(self.blocks)
-        return f"{blocks}: out after {self.mean_between_s:g} s up, for {out_s:g} s, on average"
-
-    @model_validator(mode="after")
-    def _each_once(self) -> "Outage":
-        if len(set(self.blocks)) < len(self.blocks):
-            raise ValueError(f"blocks is {list(self.blocks)}: each stands there once")
-        return self
 
 
 @dataclass(frozen=True)

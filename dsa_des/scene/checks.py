@@ -18,7 +18,6 @@ from dsa_des.errors import did_you_mean, nearest
 from dsa_des.scene.block_table import (
     Block,
     BlockOptions,
-    Outage,
     ProcessorParameters,
     split_options,
 )
@@ -28,6 +27,7 @@ from dsa_des.scene.overrides import drop_of_other_type
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.scene.wiring import Wire, why_no_block_name
+from dsa_des.stretches.outage import Outage
 from dsa_des.text.safe_text import shortened
 from dsa_des.time.clock import MAX_TICK, ClockSpec, parse_rational, resolution
 
@@ -381,14 +381,8 @@ def read_outages(scene_file: SceneFile, blocks: Mapping[str, Any], duration_s: A
         outage = read_table(scene_file, ("outages", number), Outage, entry)
         if outage is None:
             continue
-        for name in outage.blocks:
-            cls = blocks.get(name)
-            if name not in blocks:
-                message = f"the scene has no such block{did_you_mean(name, blocks)}"
-                scene_file.report(("outages", number, "blocks"), message, str(name))
-            elif cls is not None and cls.process is not None:
-                message = f"{name} has a process of its own, which an outage cannot stop"
-                scene_file.report(("outages", number, "blocks"), message)
+        for key, message, value in outage.refusals(blocks):
+            scene_file.report(("outages", number, *key), message, value)
         if outage.key in [one.key for one in read]:
             message = "fails already: give each a name of its own, which keys its draws"
             scene_file.report(("outages", number), message, outage.key)

@@ -14,7 +14,7 @@ from dsa_des.block.component import Component, Context, Parameters, as_written
 from dsa_des.block.foreign_calls import REFUSALS, must_pass, why_refused
 from dsa_des.block.registry import section_models
 from dsa_des.errors import Problem, SceneError, UsageError, did_you_mean
-from dsa_des.scene.block_table import Block, Outage, ProcessorParameters
+from dsa_des.scene.block_table import Block, ProcessorParameters
 from dsa_des.scene.changes import (
     CHANGES,
     Stretch,
@@ -50,6 +50,7 @@ from dsa_des.scene.overrides import (
 from dsa_des.scene.parameter_errors import refusal
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.scene.wiring import Wire, read_wires, with_latencies
+from dsa_des.stretches.outage import Outage
 from dsa_des.text.safe_text import printable, shortened
 from dsa_des.time.randomness import Streams
 

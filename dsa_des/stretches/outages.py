@@ -1,14 +1,15 @@
 """When blocks are out: failures and repairs drawn for every run, and what is lost by them."""
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.record.undone import SECONDS_OUT
+from dsa_des.stretches.outage import Outage
 from dsa_des.time.randomness import Streams
 from dsa_des.time.runs import Runs
 
@@ -16,32 +17,25 @@ from dsa_des.time.runs import Runs
 _AT_ONCE = 32
 
 
-class Failing(Protocol):
-    """What is known of something that fails: means and times in s, and what keys its draws."""
-
-    @property
-    def key(self) -> str:
-        """What its draws are keyed by."""
-
-    mean_between_s: float
-    mean_repair_s: float
-    restart_s: float
-
-
 class Outages:
     """When a block is out, in every run: whenever one of what it depends on is.
 
     An outage lasts from a failure to the repair and the restart. Its block does not run then, and
-    what comes over its wires is lost; what it remembers it still does afterwards.
+    what comes over its wires is lost; what it remembers it still does afterwards. In the other
+    modes it runs, and wrong values come out of it.
     """
 
     def __init__(
-        self, failing: Sequence[Failing], streams: Streams, runs: Runs, ticks_per_s: int
+        self, failing: Sequence[Outage], streams: Streams, runs: Runs, ticks_per_s: int
     ) -> None:
         self._runs, self._ticks_per_s = runs, ticks_per_s
+        self._failing = failing
         self._edges = [self._drawn(one, streams) for one in failing]
+        self._freezes = any(one.mode == "frozen" for one in failing)
+        #: The last good row of each run, by output.
+        self._last: dict[str, Message] = {}
 
-    def _drawn(self, one: Failing, streams: Streams) -> RunTicks:
+    def _drawn(self, one: Outage, streams: Streams) -> RunTicks:
         """Return when it fails and is back, in turns, of the first run, the second, and so on."""
         stream = streams.stream("[outages]", one.key)
         count, lasts_s = self._runs.count, self._runs.run_ticks / self._ticks_per_s
@@ -66,14 +60,42 @@ class Outages:
         return RunTicks(np.repeat(np.arange(count), width), ticks.reshape(-1))
 
     def up(self, instants: RunTicks) -> BoolArray:
-        """Return at which instants the block is not out."""
-        up = np.ones(len(instants), dtype=bool)
-        for edges in self._edges:
-            last = last_of_run(edges, instants)
-            there = (last >= 0) & (edges.run[last] == instants.run)
-            # Failures are even, as every run has as many.
-            up &= ~there | (last % 2 == 1)
-        return up
+        """Return at which instants the block runs."""
+        return ~self._failed("silent", instants)
+
+    def _failed(self, mode: str, instants: RunTicks) -> BoolArray:
+        """Return at which instants the block is out in a mode."""
+        failed = np.zeros(len(instants), dtype=bool)
+        for one, edges in zip(self._failing, self._edges, strict=True):
+            if one.mode == mode:
+                failed |= _out(edges, instants)
+        return failed
+
+    def sent(self, port: str, message: Message) -> Message:
+        """Return what comes out of the block's output in place of what it sends."""
+        for one, edges in zip(self._failing, self._edges, strict=True):
+            for quantity, worth in one.stuck.items():
+                message = message.with_stuck_bit(_out(edges, message.instants), quantity, worth)
+        return self._frozen(port, message) if self._freezes else message
+
+    def _frozen(self, port: str, message: Message) -> Message:
+        """Return a message with the last good row of each run in place of those while frozen."""
+        before = [self._last[port]] if port in self._last else []
+        known = sum(map(len, before))
+        both = message.concatenate([*before, message])
+        good = np.append(np.ones(known, bool), ~self._failed("frozen", message.instants))
+        order = np.argsort(both.run, kind="stable")
+        run, place = both.run[order], np.arange(len(order))
+        last = np.maximum.accumulate(np.where(good[order], place, -1))
+        here = (last >= 0) & (run[last] == run)
+        source = np.empty(len(order), dtype=np.int64)
+        source[order] = np.where(here, order[last], -1)
+        latest = source[order[np.append(run[1:] != run[:-1], True)]]
+        self._last = {**self._last, port: both.take(latest[latest >= 0])}
+        if good.all():
+            return message
+        later = both.tick[known:] - both.tick[source[known:]]
+        return message.frozen(both, source[known:], later / self._ticks_per_s)
 
     def heard(self, wake: Wake) -> Wake:
         """Return a wake without what arrived while the block was out."""
@@ -98,6 +120,15 @@ class Outages:
         out = [int((spans[:, 1] - spans[:, 0]).sum()) for spans in each]
         seconds = np.rint(np.array([out, ends]) / self._ticks_per_s).astype(np.int64)
         return {SECONDS_OUT: seconds}
+
+
+def _out(edges: RunTicks, instants: RunTicks) -> BoolArray:
+    """Return which instants lie in an outage; edges are failures and repairs, in turns."""
+    last = last_of_run(edges, instants)
+    there = (last >= 0) & (edges.run[last] == instants.run)
+    # Failures are even, as every run has as many.
+    out: BoolArray = there & (last % 2 == 0)
+    return out
 
 
 def merged(spans: IntArray, end: int) -> IntArray:

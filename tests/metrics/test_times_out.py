@@ -13,7 +13,7 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.times_out import times_out_s
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.block_table import Outage
+from dsa_des.stretches.outage import Outage
 
 #: What sees the intruder 100 m away: well clear is lost long before.
 NEAR_RADAR = {

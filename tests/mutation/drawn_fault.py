@@ -41,6 +41,17 @@ _LEFT_OUT = {
     "round",
     "wrap_pi",
 }
+#: Of these the order of arguments does not matter (but to NaN, in Python's own `min` and `max`).
+_EITHER_WAY = {
+    "min", "max", "minimum", "maximum", "fmin", "fmax", "hypot", "gcd", "lcm", "array_equal",
+    "logical_and", "logical_or", "logical_xor", "union1d",
+}  # fmt: skip
+#: Keywords that say what is so without them, or what only saves memory.
+_NEEDLESS = {
+    ("dumps", "ensure_ascii=True"), ("searchsorted", "side='left'"), ("unique", "axis=None"),
+    ("fromiter", "count"), *((name, f"dtype={of}") for of in ("np.float64", "float")
+                             for name in ("zeros", "ones", "empty", "linspace")),
+}  # fmt: skip
 _DEFINED = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
 
@@ -140,7 +151,8 @@ def faults_of(file: str, text: str) -> list[DrawnFault]:
     """Return all of them, in the order of the file.
 
     Declarations are left out: docstrings, annotations, decorators, imports, what classes declare
-    outside their methods, texts, and what is raised.
+    outside their methods, texts, and what is raised. So is what is the same by the meaning of a
+    function: its arguments in another order, or a keyword that says its default.
     """
     found: list[DrawnFault] = []
     counts: Counter[tuple[str, str]] = Counter()
@@ -271,20 +283,23 @@ def _of_calls(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
     if not isinstance(node, ast.Call):
         return
     given, keywords = node.args, node.keywords
+    called = ast.unparse(node.func).rpartition(".")[2]
+    either_way = called in _EITHER_WAY and all(each.arg == "out" for each in keywords)
     for k, (one, other) in enumerate(pairwise(given)):
-        if _is_text(one) != _is_text(other):
+        if _is_text(one) != _is_text(other) or either_way:
             continue
         swapped = [*given[:k], given[k + 1], given[k], *given[k + 2 :]]
         yield "swapped arguments", _with(node, args=swapped)
     for k, keyword in enumerate(keywords):
-        if keyword.arg not in (None, "strict", "stacklevel"):
+        said = (called, keyword.arg), (called, ast.unparse(keyword))
+        if keyword.arg not in (None, "strict", "stacklevel") and not _NEEDLESS & {*said}:
             yield "dropped keyword", _with(node, keywords=[*keywords[:k], *keywords[k + 1 :]])
     match node.func:
         case ast.Name(id=name) if name in _ALIKE:
             yield "another function", _with(node, func=_with(node.func, id=_ALIKE[name]))
         case ast.Attribute(attr=name) if name in _ALIKE:
             yield "another function", _with(node, func=_with(node.func, attr=_ALIKE[name]))
-    if ast.unparse(node.func).rpartition(".")[2] in _LEFT_OUT and len(given) == 1:
+    if called in _LEFT_OUT and len(given) == 1:
         yield "dropped function", given[0]
 
 

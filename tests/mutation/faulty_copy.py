@@ -6,7 +6,9 @@ import os
 import re
 import shutil
 import signal
+import subprocess
 import sys
+import tempfile
 import time
 import types
 from collections import deque
@@ -19,6 +21,8 @@ import pytest
 from definitions import ROOT
 from fault import Fault
 
+#: Set where a tool runs from a copy that it made of the tree.
+_IN_A_COPY = "DSA_DES_FAULTS_IN_A_COPY"
 CAUGHT, SURVIVED, OF_THE_LIST = "caught", "survived", "error of the list"
 _PARTS = (
     "dsa_des", "components", "configs", "tests", "docs", "pyproject.toml", "README.md",
@@ -265,6 +269,20 @@ def copies_in(folder: Path, count: int) -> list[FaultyCopy]:
     for place in places:
         place.mkdir()
     return [FaultyCopy(place) for place in places]
+
+
+def from_a_copy(tool: Callable[[], int]) -> int:
+    """Run the tool that was started from a copy of the tree, which may change meanwhile.
+
+    All that the tool reads later, of product, tests or lists, is as it was at its start.
+    """
+    if _IN_A_COPY in os.environ:
+        return tool()
+    with tempfile.TemporaryDirectory() as folder:
+        (copy,) = copies_in(Path(folder), 1)
+        started = copy.folder / Path(sys.argv[0]).resolve().relative_to(ROOT)
+        environment = {**os.environ, _IN_A_COPY: "yes"}
+        return subprocess.run([sys.executable, started, *sys.argv[1:]], env=environment).returncode
 
 
 def _judged(code: int | None, said: str) -> tuple[str, str]:

@@ -20,7 +20,8 @@ While you strengthen the tests of a room:
     python tests/mutation/random_faults.py --only components/view --json /tmp/view.json --survivors
 
 What no test can notice goes into `equivalent.json`, with its name and change as they are printed,
-and the reason. The copy is made of the working tree, which is never touched.
+and the reason. All is read from a copy of the working tree as it was at the start: the tree itself
+is never touched, and may change meanwhile.
 """
 
 import json
@@ -39,7 +40,7 @@ import fault_page
 import pytest
 from coverage_map import KEPT, Map
 from drawn_fault import DrawnFault, faults_of
-from faulty_copy import CAUGHT, ROOT, SURVIVED, TestRun, copies_in, tried
+from faulty_copy import CAUGHT, ROOT, SURVIVED, TestRun, copies_in, from_a_copy, tried
 
 sys.path.append(str(ROOT / "tests"))
 from run_nearest import REST, order_tests
@@ -254,4 +255,4 @@ def _arguments() -> Namespace:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(from_a_copy(main))

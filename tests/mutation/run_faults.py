@@ -17,7 +17,7 @@ from pathlib import Path
 
 import fault_page
 from fault import FAULTS, Fault
-from faulty_copy import CAUGHT, SURVIVED, Outcome, copies_in, tried
+from faulty_copy import CAUGHT, SURVIVED, Outcome, copies_in, from_a_copy, tried
 
 
 def main() -> int:
@@ -157,4 +157,4 @@ def _summary(faults: Sequence[Fault], outcomes: Sequence[Outcome]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(from_a_copy(main))

@@ -1,5 +1,6 @@
 """Every kind of block that can be wired and do nothing says so: in check, or when it has run."""
 
+import math
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -12,6 +13,9 @@ from wired import SEES_ALL, chain
 
 import dsa_des
 from components.fusion.pick_best import least_apart_s
+from components.guidance.mvp import VoltagePotential
+from components.messages.reach import FarthestLook
+from components.surveillance.exchange import PositionExchange
 from dsa_des.block.entry_points import registered
 from dsa_des.record.undone import Tries, added
 from dsa_des.replicas.lockstep import lock_step
@@ -23,9 +27,10 @@ from tests.alerting.conf_text import CONF
 #: behind it, "refused" where a scene with it does not start. Of each, that it never ran is said.
 SAID = {
     "alerting.daidalus": "check run", "alerting.m_of_n": "check", "avoidance.daidalus": "check run",
-    "avoidance.horizontal_cas": "refused", "avoidance.mvp": "", "avoidance.turn_away": "check run",
-    "encounters.closest_approach_passed": "", "foreign.fmu": "refused run",
-    "foreign.mavlink": "check run", "foreign.process": "run",
+    "avoidance.horizontal_cas": "refused", "avoidance.mvp": "check run",
+    "avoidance.turn_away": "check run", "encounters.closest_approach_passed": "",
+    "foreign.fmu": "refused run", "foreign.mavlink": "check run",
+    "foreign.process": "run",
     "fusion.covariance_intersection": "run", "fusion.gated": "run", "fusion.pass_through": "",
     "fusion.pick_best": "check run", "gate": "", "geometry.daidalus_sphere": "",
     "geometry.ellipsoid": "", "geometry.flat_earth": "", "geometry.geodesic": "",
@@ -36,7 +41,7 @@ SAID = {
     "radar.range_boundary": "refused", "radar.swerling": "check run",
     "radar.threshold": "check run", "sensor.recorded": "check refused",
     "surveillance.active": "check", "surveillance.ads_b": "check",
-    "surveillance.exchange": "", "tracking.cues": "run",
+    "surveillance.exchange": "check run", "tracking.cues": "run",
     "tracking.ekf": "check run", "tracking.hold_last": "run", "tracking.imm": "check run",
     "tracking.stonesoup": "run", "tracking.stub": "run", "tracking.ukf": "check run",
     "traffic.asterix": "refused", "traffic.csv": "refused", "traffic.daa_file": "refused",
@@ -74,6 +79,13 @@ def with_tail(found: dict[str, Any], wires: list[Any], **blocks: Any) -> dict[st
     found["blocks"] |= blocks
     found["wires"] += wires
     return found
+
+
+def steered(found: dict[str, Any], by: str, **keys: Any) -> dict[str, Any]:
+    """Return a scene in which the potential steers by what a block says of others."""
+    back = {"from": "steers", "to": "traffic", "delay_s": 0.1, "holds": "nothing"}
+    steers = {"type": "avoidance.mvp", "speed_mps": 40.0, "most_mps": 40.0, **keys}
+    return with_tail(found, [f"{by} -> steers", "traffic -> steers", back], steers=steers)
 
 
 def test_every_type_of_block_was_looked_at() -> None:
@@ -166,6 +178,9 @@ def test_an_alerting_that_needs_ranges_says_that_nobody_measures_any(
         alerts = {"type": "alerting.daidalus", "conf": str(path), "scan_rate_hz": 1}
         with_tail(found, ["traffic -> alerts", "tracker -> alerts"], alerts=alerts)
         assert (said in notes(found)) is (name == "eye")
+        # In a closed loop it is told what its optional inputs offer all the same.
+        steered(found, "alerts")
+        assert (said in notes(found)) is (name == "eye")
         if tracker == "tracking.ekf":  # directions tell ranges in time
             found["blocks"]["tracker"]["passive_range_share"] = 0.3
             assert said not in notes(found)
@@ -221,6 +236,44 @@ def test_who_hears_only_what_is_equipped_says_that_nobody_is(kind: str, needed: 
     assert said in notes(found)
     found["blocks"]["traffic"]["intruders"][0] |= {"ads_b": {}, "mode_s": True}
     assert said not in notes(found)
+
+
+def test_who_hears_of_nobody_or_of_nobody_s_velocity_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = with_tail(scene({}, duration_s=4), ["traffic -> hears"],
+                      hears={"type": "surveillance.exchange", "scan_rate_hz": 1})  # fmt: skip
+    steered(found, "hears")
+    alone = "blocks.hears: nobody else flies: it hears of nobody"
+    still = "no flights are known beside the positions: nobody has a velocity and is heard"
+    strange = "a track is near no target and is not steered for"
+    unmoved = "its own velocity is not known yet and it does not steer"
+    assert alone not in notes(found)
+    assert undone(found) == {
+        "hears": {still: (0, 4)}, "steers": {strange: (0, 8), unmoved: (0, 4)}
+    }  # fmt: skip
+    run = VoltagePotential.run
+
+    def spoilt(self: VoltagePotential, wake: Any) -> Any:
+        """The first target's track is of nobody; up to 1 s the own velocity is not known."""
+        alerts = wake["alerts"]
+        alerts.target[alerts.target == 0] = -1
+        alerts.own_motion["east_mps"][wake.time_s <= 1.0] = np.nan
+        return run(self, wake)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(VoltagePotential, "run", spoilt)
+        assert undone(found)["steers"] == {strange: (4, 8), unmoved: (2, 4)}
+    with monkeypatch.context() as patched:  # as of a host, or behind an FMU that flies
+        patched.setattr(PositionExchange, "request", lambda self, port: FarthestLook(math.inf))
+        assert undone(found)["hears"] == {still: (4, 4)}
+    slow = "speed_mps is 40 and most_mps is 18: it never flies its own way any faster"
+    slow = f"blocks.steers: {slow}"
+    assert slow not in notes(found)
+    found["blocks"]["steers"]["most_mps"] = 18.0
+    assert slow in notes(found)
+    found["blocks"]["traffic"]["intruders"] = []
+    assert alone in notes(found)
 
 
 @pytest.mark.parametrize("pilot", ["avoidance.daidalus", "operator.stochastic"])

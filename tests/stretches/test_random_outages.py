@@ -9,7 +9,7 @@ from test_changes_while_a_run_lasts import change, scans_of, scene
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.errors import SceneError
 from dsa_des.record.undone import undone_sentences
-from dsa_des.scene.block_table import Outage
+from dsa_des.stretches.outage import Outage
 from dsa_des.stretches.outages import Outages
 from dsa_des.time.randomness import Streams
 from dsa_des.time.runs import Runs
@@ -104,6 +104,70 @@ def test_what_fails_together_is_out_together_and_draws_by_its_name():
     ]  # though a block that lacks something so seldom is not worth a sentence
 
 
+MEASURED = ["azimuth_rad", "elevation_rad", "range_m", "confidence", "snr_db"]
+
+
+def by_scan(table):
+    """Return what was measured, and whether of nothing that is there, by tick of the scan."""
+    found = {}
+    columns = [table[name].to_pylist() for name in ("tick", "target", *MEASURED)]
+    for tick, target, *values in zip(*columns, strict=True):
+        found.setdefault(tick, []).append((target is None, values))
+    return found
+
+
+def last_good(ticks, spans):
+    """Return, of each instant, itself, or the last one before it that lies in no span."""
+    good = [not any(first <= tick < last for first, last in spans) for tick in ticks]
+    return [next((ticks[k] for k in range(n, -1, -1) if good[k]), None) for n in range(len(ticks))]
+
+
+@covers("mode", of=("[outages]",))
+def test_a_frozen_radar_sends_its_last_detections_again_and_again():
+    frozen = [outage("radar", mode="frozen")]
+    made = scene(change("blocks.radar.scan_rate_hz", 4), tracks=True, outages=frozen)
+    got = same_in_any_window(made, windows=(1, 5))
+    same_as_alone(replicas_of(made, {}, {}, {}), window=30)
+    simulation, never = tables_of(scene(change("blocks.radar.scan_rate_hz", 4), tracks=True))
+    spans = Outages(made.outages, Streams([3]), simulation.runs, 10**9).spans(0)
+    columns = [n for n in never["scans"].column_names if n != "detected"]
+    assert got["scans"].select(columns).equals(never["scans"].select(columns))
+    ticks = never["scans"]["tick"].to_pylist()
+    mine, theirs = by_scan(got["detections"]), by_scan(never["detections"])
+    sources = last_good(ticks, spans)
+    assert 10 < sum(tick != source for tick, source in zip(ticks, sources, strict=True)) < 100
+    for tick, source in zip(ticks, sources, strict=True):
+        want = [(tick != source, values) for _, values in theirs.get(source, [])]
+        assert mine.get(tick, []) == want
+    false = got["detections"].filter(got["detections"]["target"].is_null())
+    assert false["true_range_m"].null_count == len(false) > 0
+
+
+@covers("stuck", of=("[outages]",))
+@pytest.mark.parametrize(
+    ("quantity", "column", "worth"), [("range_m", "range_m", 512.0),
+                                      ("azimuth_deg", "azimuth_rad", np.radians(45.0))],
+)  # fmt: skip
+def test_a_bit_that_sticks_is_set_in_every_value_while_it_does(quantity, column, worth):
+    stuck = {"mode": "stuck_bit", "stuck": {quantity: 512.0 if "m" in quantity[-2:] else 45.0}}
+    made = scene(outages=[outage("radar", **stuck)])
+    simulation, tables = tables_of(made)
+    spans = Outages(made.outages, Streams([3]), simulation.runs, 10**9).spans(0)
+    got, never = tables["detections"], tables_of(scene())[1]["detections"]
+    assert got.drop_columns([column]).equals(never.drop_columns([column]))
+    out = [any(a <= t < b for a, b in spans) for t in never["tick"].to_pylist()]
+    changed = 0
+    for tick_out, was, is_now in zip(
+        out, never[column].to_pylist(), got[column].to_pylist(), strict=True
+    ):
+        # An angle is a word of a whole turn: below 0 it is one just under 360 degrees.
+        word = was % (2 * np.pi) if column == "azimuth_rad" else was
+        want = was if not tick_out or int(word / worth) & 1 else was + worth
+        assert is_now == pytest.approx(want, abs=1e-9)
+        changed += want != was
+    assert 0.02 * len(out) < changed < len(out)
+
+
 def test_wrong_outages_are_said():
     for entry, said in (
         (outage("rader"), "did you mean 'radar'?"),
@@ -112,6 +176,12 @@ def test_wrong_outages_are_said():
         (outage("radar", mean_between_s=0), "greater than 0"),
         (outage("radar", mean_between_s=1e-5), "at most 100,000 failures"),
         (outage("radar", every_s=3), "every_s"),
+        (outage("radar", mode="dead"), "'frozen'"),
+        (outage("radar", mode="stuck_bit"), "stuck = { QUANTITY = WORTH }"),
+        (outage("radar", stuck={"range_m": 8}), "the one asks for the other"),
+        (outage("radar", mode="stuck_bit", stuck={"range": 8}), "did you mean 'range_m'?"),
+        (outage("radar", mode="stuck_bit", stuck={"range_m": 0}), "must be greater than 0"),
+        (outage("gate", mode="frozen"), "gate sends no values of a sensor"),
     ):
         with pytest.raises(SceneError) as wrong:
             scene(outages=[entry])
