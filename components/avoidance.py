@@ -196,7 +196,7 @@ class TurnOut(Component):
         return {port: message for port, message in messages.items() if message is not None}
 
     def _hear(self, wake: Wake) -> None:
-        """Take in what others have told, each the last thing of its own."""
+        """Take in the latest choice of each other aircraft."""
         since = int(wake.ticks[0]) - int(self.p.heeds_s * self.context.ticks_per_s)
         for new in wake.arrivals("told") if self.p.address is not None else ():
             sides = new.message
@@ -206,7 +206,7 @@ class TurnOut(Component):
                 self._heard[run] = (*known, (one[0], one[1], one[2]))
 
     def _other_choices(self, run: int, tick: int) -> list[tuple[int, int]]:
-        """Return address and side of all that have told theirs and count at an instant.
+        """Return address and side of every other aircraft whose choice is valid at an instant.
 
         The lowest address first; windows may know more than has come by then.
         """
@@ -233,7 +233,8 @@ class TurnOut(Component):
         return bool(mine and first and self._matching_side(first[0]) != mine)
 
     def _choose(self, run: int, tick: int, changes: tuple[float, float]) -> float | None:
-        """Return the change to fly: the smaller one, or that which goes with what others told.
+        """Return the change to fly: the smaller one, or the one compatible with the others'
+        choices.
 
         Without a way there it is free.
         """

@@ -67,7 +67,7 @@ class RcsTable:
     def dbsm(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> Any:
         """Return the RCS in dBsm seen from a direction."""
         nodes = self.azimuth_deg, self.elevation_deg
-        return _interpolated(*nodes, self.rcs_dbsm, azimuth_rad, elevation_rad)
+        return _interpolate(*nodes, self.rcs_dbsm, azimuth_rad, elevation_rad)
 
     def rcs_m2(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> Any:
         """Return the RCS in m² seen from a direction; see `dbsm`."""
@@ -118,7 +118,7 @@ class SilhouetteTable:
     def area(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> Any:
         """Return the area in m² seen from a direction."""
         nodes = self.azimuth_deg, self.elevation_deg
-        return _interpolated(*nodes, self.area_m2, azimuth_rad, elevation_rad)
+        return _interpolate(*nodes, self.area_m2, azimuth_rad, elevation_rad)
 
 
 def table_from_nodes(
@@ -150,7 +150,7 @@ def read_aspect_table(path: str | PathLike[str]) -> SilhouetteTable:
         raise ValueError(f"{path}: {error}") from None
 
 
-def _interpolated(
+def _interpolate(
     nodes_deg: FloatArray,
     levels: FloatArray,
     table: FloatArray,

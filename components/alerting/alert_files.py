@@ -15,12 +15,12 @@ from components.alerting.encounter import Encounter, read_encounter
 from components.alerting.levels import Alerts, alert_levels
 from components.formats.recorded.traffic_of_files import TrafficChoice
 from components.formats.text_rows import SPEED_MPS, TrafficFileError
-from dsa_des.block.shipped_files import found_or_shipped
+from dsa_des.block.shipped_files import resolve_shipped
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
 from dsa_des.files.output_file import PICTURES, check_ending, check_file, write_file
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.files.output_names import named, reason_of
+from dsa_des.files.output_names import reason_of, user_path
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
 
@@ -51,7 +51,7 @@ def alert_files(
     """Write the tables and figures that the command line asks for."""
     paths, several = _list_encounter_files(encounters)
     names = {"--out": out, "--figure": figure, "--bands": bands}
-    places = {option: named(name, option) for option, name in names.items() if name is not None}
+    places = {option: user_path(name, option) for option, name in names.items() if name is not None}
     for (option, path), (other, its) in combinations(places.items(), 2):
         if path.resolve() == its.resolve():
             raise UsageError(f"{other} and {option} name the same place: each needs its own")
@@ -87,7 +87,7 @@ def _list_encounter_files(encounters: tuple[str, ...]) -> tuple[list[Path], bool
     several = len(encounters) > 1
     for text in encounters:
         try:
-            path = found_or_shipped(resolve_home(text), text)
+            path = resolve_shipped(resolve_home(text), text)
         except InputFileError as error:
             raise UsageError(f"{text}: {error}") from error
         if not is_folder(path):

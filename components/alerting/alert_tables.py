@@ -39,7 +39,7 @@ _SEPARATION = (
 
 
 def without_memory(configuration: Configuration) -> Configuration:
-    """Return a configuration in which every row stands by itself."""
+    """Return a configuration without hysteresis, so that every row is judged independently."""
     values = dict(configuration.values)
     values.update(hysteresis_time=0.0, persistence_time=0.0, alerting_m=0, alerting_n=0)
     return replace(configuration, values=values)

@@ -74,7 +74,7 @@ class EstimatedFlights:
             covariance=np.array([tracks.covariance[COVARIANCE[pair]] for pair in _PAIRS]),
             origin=np.array([getattr(tracks, name) for name in ORIGIN]),
         )
-        self._tracks = KeyedTable.joined([self._tracks, new.take(good)])
+        self._tracks = KeyedTable.concatenate([self._tracks, new.take(good)])
 
     def keep(self, which: BoolArray) -> None:
         """Keep some of the rows that came."""

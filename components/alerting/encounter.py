@@ -19,7 +19,7 @@ from components.guidance.situation import State
 from components.well_clear.detection import Bounds
 from components.well_clear.volume import Relative
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 Samples = dict[str, FloatArray]
 
@@ -129,12 +129,12 @@ def _samples(
     if len(result) < 2:
         Problems(str(path)).fail(
             f"no aircraft is there at a time at which {own.name} is" if file.intruders else
-            f"there is one aircraft only, {shortened(own.name)!r}: an ownship and at least one "
+            f"there is one aircraft only, {shorten(own.name)!r}: an ownship and at least one "
             "intruder are needed"
         )  # fmt: skip
     notes = [*file.notes, "flights are interpolated to the times of the ownship"]
     if far:
-        notes.append(f"never there at a time of the ownship: {shortened(', '.join(far))}")
+        notes.append(f"never there at a time of the ownship: {shorten(', '.join(far))}")
     return result, tuple(notes)
 
 

@@ -29,7 +29,7 @@ class ReceivedRows(KeyedTable):
     def append(self, came: RunTicks, **columns: Any) -> Self:
         """Return them with rows that came later, or in other runs."""
         new = type(self)(replica=came.run, came=came.tick, **columns)
-        every = self.joined([self, new])
+        every = self.concatenate([self, new])
         order = every.instants.order()
         return every if order is None else every.take(order)
 
@@ -75,7 +75,7 @@ class OwnPoses:
         index = np.minimum(last_of_run(self._made_ticks, measured), self._poses.last(came))
         first = first_of_run(self._poses.instants, came.run)
         if self._old and bool((asked & (index <= first)).any()):
-            every = ReceivedRows.joined([*self._old, self._poses])
+            every = ReceivedRows.concatenate([*self._old, self._poses])
             order = every.instants.order()
             self._keep(every if order is None else every.take(order))
             self._old = []

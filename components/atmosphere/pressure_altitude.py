@@ -13,7 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, finite, positive, refuse, unflatten, within
+from components.arguments.checks import (
+    broadcast_flat,
+    check_within,
+    finite,
+    positive,
+    refuse,
+    unflatten,
+)
 
 #: Pressure at sea level, hPa.
 STANDARD_HPA = 1013.25
@@ -41,7 +48,7 @@ def pressure_altitude_m(
     """
     offsets = finite("offset_k", offset_k)
     refuse("offset_k", offsets, offsets <= -100.0, "be above -100")
-    heights = within("height_m", height_m, LOWEST_M, HIGHEST_M, "m")
+    heights = check_within("height_m", height_m, LOWEST_M, HIGHEST_M, "m")
     shape, (height, qnh, offset) = broadcast_flat(
         height_m=heights, qnh_hpa=positive("qnh_hpa", qnh_hpa), offset_k=offsets
     )

@@ -135,7 +135,7 @@ class PlainLook:
     variance: FloatArray
 
 
-def seen(state: FloatArray, look: PlainLook, size: int) -> tuple[FloatArray, FloatArray]:
+def measure_state(state: FloatArray, look: PlainLook, size: int) -> tuple[FloatArray, FloatArray]:
     """Return what a look would measure of a state, (size,), and the derivative, (size, 6)."""
     away = state[:3] - look.position_m
     x, y, z = look.to_body @ away
@@ -175,7 +175,7 @@ def track_plainly(
             states[k], covariances[k] = state, covariance
             if count == 0:
                 continue
-            expected, slope = seen(state, look, size)
+            expected, slope = measure_state(state, look, size)
             apart = look.measured - expected
             apart[:, 0] = (apart[:, 0] + pi) % (2.0 * pi) - pi
             total = slope @ covariance @ slope.T
@@ -211,7 +211,7 @@ def plainly(targets: int) -> tuple[int, Callable[[], object]]:
     block = listening(1, targets)
     scans, poses = _looks(block)
     looks = plain_looks(scans, poses, block.context.ticks_per_s)
-    first, rest = _started(scans, poses, block.p.start_speed_m_s), looks[1:]
+    first, rest = _start_tracks(scans, poses, block.p.start_speed_m_s), looks[1:]
     updates = sum(len(look.measured) for look in rest)
     intensity = block.p.acceleration_intensity_m2_s3
     return updates, lambda: track_plainly(rest, *first, intensity, looks[0].time_s)
@@ -303,7 +303,7 @@ def plain_looks(scans: Scans, poses: SensorPose, ticks_per_s: int) -> list[Plain
     return result
 
 
-def _started(
+def _start_tracks(
     scans: Scans, poses: SensorPose, speed_m_s: float
 ) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return a track for each detection of the first look, as our trackers start them."""

@@ -112,6 +112,6 @@ def draw_alerted_lines(
 
 
 def draw_manoeuvres(axes: Any, x: FloatArray, y: FloatArray) -> None:
-    """Mark where, or when, the ownship was told to fly otherwise."""
+    """Mark where, or when, the ownship was commanded to manoeuvre."""
     if len(x):
         axes.plot(x, y, **_MANOEUVRE, zorder=3.2, scalex=False, scaley=False, clip_on=False)

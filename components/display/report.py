@@ -75,7 +75,7 @@ class DetectAndSenseReport:
         from components.display.timeline import draw_timeline
         from components.display.tracks import DrawnTracks, draw_tracks
 
-        flights = Flights.of(simulation, summary)
+        flights = Flights.from_simulation(simulation, summary)
         detected = Detected.read(folder, sensor_names(simulation))
         detected.styles = styles_of(detected.sensors, simulation.components)
         alerted = Alerted.read(folder)

@@ -53,23 +53,23 @@ def geodesic_parameters(
     n = FLATTENING / (2.0 - FLATTENING)
     semi_minor = SEMI_MAJOR_AXIS_M * (1.0 - FLATTENING)
     # The cosine from the distance to the pole in degrees, which is exact, keeps its digits there.
-    sin_beta = (1.0 - FLATTENING) * _each(math.sin, _each(math.radians, lat_deg))
-    cos_beta = _each(math.sin, _each(math.radians, 90.0 - abs(lat_deg)))
-    length = _each(math.hypot, sin_beta, cos_beta)
+    sin_beta = (1.0 - FLATTENING) * _map_numbers(math.sin, _map_numbers(math.radians, lat_deg))
+    cos_beta = _map_numbers(math.sin, _map_numbers(math.radians, 90.0 - abs(lat_deg)))
+    length = _map_numbers(math.hypot, sin_beta, cos_beta)
     # At the very pole every meridian starts; a tiny cosine keeps the one that was asked for.
-    sin_beta, cos_beta = sin_beta / length, _each(_not_zero, cos_beta / length)
-    sin_az, cos_az = _each(math.sin, azimuth_rad), _each(math.cos, azimuth_rad)
+    sin_beta, cos_beta = sin_beta / length, _map_numbers(_avoid_zero, cos_beta / length)
+    sin_az, cos_az = _map_numbers(math.sin, azimuth_rad), _map_numbers(math.cos, azimuth_rad)
     sin_az0 = sin_az * cos_beta
-    cos_az0 = _each(math.hypot, cos_az, sin_az * sin_beta)
+    cos_az0 = _map_numbers(math.hypot, cos_az, sin_az * sin_beta)
     along = cos_az * cos_beta
-    sigma1 = _each(_arc, sin_beta, along, sin_beta, cos_az)
+    sigma1 = _map_numbers(_arc, sin_beta, along, sin_beta, cos_az)
     # Not by the sine and cosine of sigma1: near a pole they have lost the longitude.
-    omega1 = _each(_arc, sin_az0 * sin_beta, along, sin_beta, cos_az)
+    omega1 = _map_numbers(_arc, sin_az0 * sin_beta, along, sin_beta, cos_az)
     k2 = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED) * cos_az0 * cos_az0
-    eps = k2 / (2.0 * (1.0 + _each(math.sqrt, 1.0 + k2)) + k2)
+    eps = k2 / (2.0 * (1.0 + _map_numbers(math.sqrt, 1.0 + k2)) + k2)
     a1, c1, c1_inverse = _distance_series(eps)
     a3, c3 = _longitude_series(eps, n)
-    sines = [_each(math.sin, 2 * (j + 1) * sigma1) for j in range(len(c1))]
+    sines = [_map_numbers(math.sin, 2 * (j + 1) * sigma1) for j in range(len(c1))]
     lon_slope = FLATTENING * sin_az0 * a3
     # Radius of curvature along the heading (Euler): what turns metres aloft into metres below.
     meridian, prime_vertical = radii_of_curvature(lat_deg)
@@ -78,17 +78,17 @@ def geodesic_parameters(
     table[_SPEED_RADIUS] = speed_mps * radius
     table[_CENTRE_DISTANCE] = radius + alt_m
     table[_CLIMB], table[_ALT] = climb_mps, alt_m
-    table[_TAU], table[_PER_METRE] = sigma1 + _added(c1, sines), 1.0 / (semi_minor * a1)
+    table[_TAU], table[_PER_METRE] = sigma1 + _sum_products(c1, sines), 1.0 / (semi_minor * a1)
     table[_SIN_AZ0], table[_COS_AZ0] = sin_az0, cos_az0
-    i3 = sigma1 + _added(c3, sines)
-    table[_LON_RAD] = _each(math.radians, lon_deg) - omega1 + lon_slope * i3
+    i3 = sigma1 + _sum_products(c3, sines)
+    table[_LON_RAD] = _map_numbers(math.radians, lon_deg) - omega1 + lon_slope * i3
     table[_LON_SLOPE], table[_SIGMA], table[_RADIUS] = lon_slope, sigma1, radius
     table[_INVERSE : _INVERSE + _INVERSE_TERMS] = c1_inverse
     table[_LONGITUDE : _LONGITUDE + _LONGITUDE_TERMS] = c3[:_LONGITUDE_TERMS]
     return table
 
 
-def _each(function: Callable[..., float], *values: Any) -> Any:
+def _map_numbers(function: Callable[..., float], *values: Any) -> Any:
     """Return a function of numbers, or of each of the numbers in arrays."""
     if not isinstance(values[0], np.ndarray):
         return function(*values)
@@ -96,7 +96,7 @@ def _each(function: Callable[..., float], *values: Any) -> Any:
     return np.fromiter(map(function, *columns), dtype=np.float64, count=len(values[0]))
 
 
-def _not_zero(cosine: float) -> float:
+def _avoid_zero(cosine: float) -> float:
     return max(cosine, 1e-100)
 
 
@@ -107,10 +107,10 @@ def _arc(y: float, x: float, sin_beta: float, cos_az: float) -> float:
 
 def _power(base: Any, exponent: int) -> Any:
     """Return a power as Python takes it, also of each value of an array: NumPy's differs."""
-    return _each(lambda value: value**exponent, base)
+    return _map_numbers(lambda value: value**exponent, base)
 
 
-def _added(factors: Sequence[Any], sines: Sequence[Any]) -> Any:
+def _sum_products(factors: Sequence[Any], sines: Sequence[Any]) -> Any:
     """Return the sum of products, from the first to the last (`sum` rounds in ways of its own)."""
     total = factors[0] * sines[0]
     for factor, sine in zip(factors[1:], sines[1:], strict=False):
@@ -149,7 +149,7 @@ def geodesic_state(
     sine, cosine, spare = np.sin(tau), np.cos(tau), np.empty_like(tau)
     delta = _sine_series(table, _INVERSE, _INVERSE_TERMS, sine, cosine, spare)
     sigma = np.add(tau, delta, out=tau)
-    _turn_on(sine, cosine, delta, spare)  # now those of sigma
+    _advance_angle(sine, cosine, delta, spare)  # now those of sigma
     along = table[_COS_AZ0] * cosine
     sin_az0 = table[_SIN_AZ0]
     cos_beta = np.multiply(along, along, out=spare)
@@ -171,7 +171,9 @@ def geodesic_state(
     return lat, wrap_longitude_deg(lon), climbed, wrap_heading_rad(yaw)
 
 
-def _turn_on(sine: FloatArray, cosine: FloatArray, delta: FloatArray, spare: FloatArray) -> None:
+def _advance_angle(
+    sine: FloatArray, cosine: FloatArray, delta: FloatArray, spare: FloatArray
+) -> None:
     """Turn a sine and cosine on by a small angle (below 9e-4), in place; overwrites all.
 
     The small angle's own sine and cosine are series to its fifth power; then the addition theorem.

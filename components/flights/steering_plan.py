@@ -13,7 +13,7 @@ import numpy as np
 from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.flights.leg_motion import LARGEST_TURN_RADIUS_M
 from components.flights.legs import AnyLeg, Straight, Turn
-from components.flights.point_mass import eased_turn
+from components.flights.point_mass import eased_turn_rates
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry import TrajectoryState, line_of_sight_ned
 from components.messages.steering import Manoeuvre
@@ -47,10 +47,10 @@ class Turning(NamedTuple):
     rate_rad_s: float
     turned_rad: float
 
-    def eased(self, manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
+    def eased_pieces(self, manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
         """Return the rates of an eased turn to a manoeuvre's track, the short way round."""
         left_rad = math.remainder(manoeuvre.heading_rad - self.track_rad, 2.0 * math.pi)
-        rates = eased_turn(
+        rates = eased_turn_rates(
             left_rad,
             left_rad + self.turned_rad,
             self.rate_rad_s,
@@ -72,12 +72,12 @@ class SteeringPlan(NamedTuple):
     speeds: Pieces
     speed_mps: float
 
-    def after(self, elapsed_s: float) -> SteeringPlan:
+    def remaining_after(self, elapsed_s: float) -> SteeringPlan:
         """Return what is left of it after some time."""
         return self._replace(
-            turns=_left(self.turns, elapsed_s),
-            climbs=_left(self.climbs, elapsed_s),
-            speeds=_left(self.speeds, elapsed_s),
+            turns=_remaining_pieces(self.turns, elapsed_s),
+            climbs=_remaining_pieces(self.climbs, elapsed_s),
+            speeds=_remaining_pieces(self.speeds, elapsed_s),
         )
 
     def with_manoeuvre(self, manoeuvre: Manoeuvre, alt_m: float, turning: Turning) -> SteeringPlan:
@@ -85,7 +85,7 @@ class SteeringPlan(NamedTuple):
         plan = self
         speed_now_mps = _mean(self.speeds, 0.0, self.speed_mps)
         if manoeuvre.eases_rad > 0.0:
-            plan = plan._replace(turns=turning.eased(manoeuvre, speed_now_mps))
+            plan = plan._replace(turns=turning.eased_pieces(manoeuvre, speed_now_mps))
         elif manoeuvre.turn_rad != 0.0:
             plan = plan._replace(turns=_turn(manoeuvre, speed_now_mps))
         if manoeuvre.vertical_speed_mps != 0.0:
@@ -122,7 +122,7 @@ class SteeringPlan(NamedTuple):
             speed_mps = max(_mean(plan.speeds, lasts_s, plan.speed_mps), 0.0)
             rate_deg_s = plan.turns[0][1] if plan.turns else 0.0
             legs.append(_leg(lasts_s, speed_mps, climb_mps, rate_deg_s))
-            plan = plan.after(lasts_s)
+            plan = plan.remaining_after(lasts_s)
         return [*legs, _leg(None, plan.speed_mps, plan.climb_mps)]
 
 
@@ -148,7 +148,7 @@ def _turn(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
     angle_rad = math.radians(math.degrees(abs(manoeuvre.turn_rad)))
     rolling: Pieces = ()
     if manoeuvre.roll_rate_rad_s:
-        rolling = _roll_in(angle_rad, rate_rad_s, manoeuvre.roll_rate_rad_s, speed_mps)
+        rolling = _roll_in_pieces(angle_rad, rate_rad_s, manoeuvre.roll_rate_rad_s, speed_mps)
         angle_rad -= math.radians(sum(lasts_s * mean for lasts_s, mean, _ in rolling))
         sign = math.copysign(1.0, manoeuvre.turn_rad)
         rolling = tuple((lasts_s, sign * mean, 0.0) for lasts_s, mean, _ in rolling)
@@ -156,7 +156,9 @@ def _turn(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
     return (*rolling, (rest_s, rate_deg_s, 0.0)) if rest_s > _SHORTEST_PIECE_S else rolling
 
 
-def _roll_in(angle_rad: float, rate_rad_s: float, roll_rad_s: float, speed_mps: float) -> Pieces:
+def _roll_in_pieces(
+    angle_rad: float, rate_rad_s: float, roll_rad_s: float, speed_mps: float
+) -> Pieces:
     """Return how a turn begins whose bank grows at a steady rate, at mean rates in deg/s.
 
     With the bank p t the rate is g tan(p t) / v, and the change of heading after t is
@@ -188,7 +190,7 @@ def _roll_in(angle_rad: float, rate_rad_s: float, roll_rad_s: float, speed_mps: 
     )
 
 
-def _left(pieces: Pieces, elapsed_s: float) -> Pieces:
+def _remaining_pieces(pieces: Pieces, elapsed_s: float) -> Pieces:
     for number, (lasts_s, mean, change) in enumerate(pieces):
         # What rounding leaves of a piece is none.
         if elapsed_s < lasts_s - _SHORTEST_PIECE_S:
@@ -212,7 +214,7 @@ class SteeredPart(ScriptedTrajectory):
     plan: SteeringPlan
 
 
-def flown_from(
+def steered_parts(
     name: str,
     around: TrajectoryState,
     time_s: FloatArray,
@@ -234,7 +236,9 @@ def flown_from(
             north_m, east_m, base_s = ways[row]
             heading_deg = math.degrees(math.atan2(east_m, north_m))
             speed_mps = math.hypot(north_m, east_m) / base_s
-            plan = SteeringPlan((), (), _own_climb((high - low) / base_s, manoeuvre), (), speed_mps)
+            plan = SteeringPlan(
+                (), (), _remaining_climb((high - low) / base_s, manoeuvre), (), speed_mps
+            )
             turned_rad = math.remainder(
                 float(around.yaw_rad[row, 2] - around.yaw_rad[row, 0]), 2.0 * math.pi
             )
@@ -242,15 +246,15 @@ def flown_from(
         else:
             heading_deg = math.degrees(float(around.yaw_rad[row, 1]))
             elapsed_s = at_s - earlier.start_time_s
-            plan = earlier.plan.after(elapsed_s)
+            plan = earlier.plan.remaining_after(elapsed_s)
             turned_rad = math.radians(
-                _turned(earlier.plan.turns, elapsed_s)
-                - _turned(earlier.plan.turns, elapsed_s - 1.0)
+                _turned_angle_deg(earlier.plan.turns, elapsed_s)
+                - _turned_angle_deg(earlier.plan.turns, elapsed_s - 1.0)
             )
             rate_rad_s = math.radians(_mean(plan.turns, 0.0, 0.0))
         turning = Turning(math.radians(heading_deg), rate_rad_s, turned_rad)
         plan = plan.with_manoeuvre(manoeuvre, here, turning)
-        flown.append(_flown_from(name, position, heading_deg, at_s, plan))
+        flown.append(_steered_part(name, position, heading_deg, at_s, plan))
     return flown
 
 
@@ -266,7 +270,7 @@ def chords(around: TrajectoryState, time_s: FloatArray) -> list[list[float]]:
     return np.stack([*ways, np.ptp(times_around_s(time_s), axis=1)], axis=-1).tolist()
 
 
-def _turned(turns: Pieces, elapsed_s: float) -> float:
+def _turned_angle_deg(turns: Pieces, elapsed_s: float) -> float:
     """Return how far has been turned after some time, deg."""
     turned_deg, left_s = 0.0, elapsed_s
     for lasts_s, rate_deg_s, _ in turns:
@@ -277,7 +281,7 @@ def _turned(turns: Pieces, elapsed_s: float) -> float:
     return turned_deg
 
 
-def _own_climb(climb_mps: float, manoeuvre: Manoeuvre) -> float:
+def _remaining_climb(climb_mps: float, manoeuvre: Manoeuvre) -> float:
     """Return the climb that is left of a flight's own: a turn or a climb ends it."""
     turns = manoeuvre.turn_rad != 0.0 or manoeuvre.eases_rad > 0.0
     ends = turns or manoeuvre.climb_m != 0.0
@@ -286,7 +290,7 @@ def _own_climb(climb_mps: float, manoeuvre: Manoeuvre) -> float:
 
 # A study's metrics fly again what its runs flew.
 @lru_cache(maxsize=4096)
-def _flown_from(
+def _steered_part(
     name: str,
     position: tuple[float, float, float],
     heading_deg: float,

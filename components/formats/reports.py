@@ -84,7 +84,7 @@ def recording_of(
         own, lambda c: {**c, **enu_velocity(c)},
         kind=log.kind, units=log.units, callsigns=log.callsigns,
     )  # fmt: skip
-    others = table.of_second("alt")
+    others = table.count_with_second("alt")
     recording.height = f"{kinds[0 if others is not None else 1]} altitude"
     if others:
         recording.height += f", of {others} aircraft {kinds[1]}"

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import common_shape, shaped, squarable
+from components.arguments.checks import broadcast_results, common_shape, squarable
 from dsa_des.arrays.column_values import one_row
 from dsa_des.arrays.types import FloatArray
 
@@ -71,7 +71,7 @@ def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
         many turns lose nothing beyond what the input itself had lost.
     """
     angle = squarable("angle_rad", angle_rad)
-    (wrapped,) = shaped(angle.shape, wrap_pi_unchecked(np.atleast_1d(angle)))
+    (wrapped,) = broadcast_results(angle.shape, wrap_pi_unchecked(np.atleast_1d(angle)))
     return wrapped
 
 
@@ -111,7 +111,7 @@ def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
     flat = np.atleast_1d(angle)
     inside = (flat >= 0.0) & (flat < TWO_PI)
     wrapped = np.where(inside, flat, positive_turn(wrap_pi_unchecked(flat))) + 0.0
-    (wrapped,) = shaped(angle.shape, wrapped)
+    (wrapped,) = broadcast_results(angle.shape, wrapped)
     return wrapped
 
 
@@ -259,7 +259,7 @@ def longitude_difference_deg(
     lon1, lon2 = squarable("lon1_deg", lon1_deg), squarable("lon2_deg", lon2_deg)
     shape = common_shape(lon1_deg=lon1, lon2_deg=lon2)
     difference, error = _longitude_difference(np.atleast_1d(lon1), np.atleast_1d(lon2))
-    difference, error = shaped(shape, difference, error)
+    difference, error = broadcast_results(shape, difference, error)
     return difference, error
 
 

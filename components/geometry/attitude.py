@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import common_shape, shaped, squarable
+from components.arguments.checks import broadcast_results, common_shape, squarable
 from components.geometry.angles import Vector, sine_and_cosine, wrap_pi
 from dsa_des.arrays.types import FloatArray
 
@@ -47,7 +47,7 @@ def ned_to_body(
     shape, arrays = check_arguments(
         north=north, east=east, down=down, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
     )
-    x, y, z = shaped(shape, *ned_to_body_unchecked(*arrays))
+    x, y, z = broadcast_results(shape, *ned_to_body_unchecked(*arrays))
     return x, y, z
 
 
@@ -79,7 +79,7 @@ def body_to_ned(
     level_y, level_z = turn_axes(by, bz, -roll)
     down, level_x = turn_axes(level_z, bx, -pitch)
     north, east = turn_axes(level_x, level_y, -yaw)
-    north, east, down = shaped(shape, north, east, down)
+    north, east, down = broadcast_results(shape, north, east, down)
     return north, east, down
 
 
@@ -98,7 +98,7 @@ def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Vec
         Length 1. From body angles instead of NED angles it gives x, y, z in body axes.
     """
     shape, arrays = check_arguments(azimuth_rad=azimuth_rad, elevation_rad=elevation_rad)
-    north, east, down = shaped(shape, *unit_vector_unchecked(*arrays))
+    north, east, down = broadcast_results(shape, *unit_vector_unchecked(*arrays))
     return north, east, down
 
 
@@ -128,7 +128,7 @@ def body_angles(
     """
     shape, arrays = check_arguments(x=x, y=y, z=z)
     wide = (np.ascontiguousarray(np.broadcast_to(a, shape or (1,))) for a in arrays)
-    p, q = shaped(shape, *body_angles_unchecked(*wide))
+    p, q = broadcast_results(shape, *body_angles_unchecked(*wide))
     return p, q
 
 
@@ -159,7 +159,7 @@ def relative_attitude(
         target_pitch_rad=target_pitch_rad,
         target_roll_rad=target_roll_rad,
     )
-    psi, theta, phi = shaped(shape, yaw - azimuth, elevation - pitch, elevation - roll)
+    psi, theta, phi = broadcast_results(shape, yaw - azimuth, elevation - pitch, elevation - roll)
     return wrap_pi(psi), wrap_pi(theta), wrap_pi(phi)
 
 

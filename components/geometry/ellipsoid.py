@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import positions, shaped
+from components.arguments.checks import broadcast_results, positions
 from components.geometry.angles import (
     RAD_PER_DEG,
     direction_angle,
@@ -71,7 +71,7 @@ def line_of_sight(
     # Offsets below 1e-150 m square to zero, which is right to every digit asked for.
     with np.errstate(under="ignore"):
         azimuth, elevation, slant_range = spherical_from_enu(*north_east_up(*arrays))
-    azimuth, elevation, slant_range = shaped(shape, azimuth, elevation, slant_range)
+    azimuth, elevation, slant_range = broadcast_results(shape, azimuth, elevation, slant_range)
     return azimuth, elevation, slant_range
 
 
@@ -90,7 +90,7 @@ def slant_range_m(
     arrays, shape = positions(own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, False)
     with np.errstate(under="ignore"):
         north, east, up = north_east_up(*arrays)
-        (range_m,) = shaped(shape, np.sqrt(north * north + east * east + up * up))
+        (range_m,) = broadcast_results(shape, np.sqrt(north * north + east * east + up * up))
     return range_m
 
 
@@ -149,7 +149,7 @@ def line_of_sight_ned(
     )
     with np.errstate(under="ignore"):
         north, east, up = north_east_up(*arrays)
-    north, east, down = shaped(shape, north, east, 0.0 - up)
+    north, east, down = broadcast_results(shape, north, east, 0.0 - up)
     return north, east, down
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import shaped
+from components.arguments.checks import broadcast_results
 from components.geometry.angles import direction_angle, slope_angle, wrap_pi_unchecked
 from components.geometry.attitude import (
     azimuth_off_nose,
@@ -139,7 +139,7 @@ def sensor_angles(
         pitch_rad=pitch_rad,
         roll_rad=roll_rad,
     )
-    p, q = shaped(shape, *_angle_by_angle(azimuth, elevation, yaw, pitch))
+    p, q = broadcast_results(shape, *_angle_by_angle(azimuth, elevation, yaw, pitch))
     return p, q
 
 

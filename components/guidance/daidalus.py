@@ -18,7 +18,7 @@ from components.messages.alerts import (
     BAND_REGIONS,
     AlertLevels,
     GuidanceBands,
-    never_reached,
+    note_unreached_level,
 )
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters, Producer, ScenePath
@@ -154,7 +154,7 @@ def explain_no_steering(
     level: int, configuration: Configuration, alerter: Alerter, producers: Sequence[Producer]
 ) -> list[str]:
     """Say where no alert reaches the level from which somebody steers, or no band is red."""
-    said = never_reached("level", level, producers)
+    said = note_unreached_level("level", level, producers)
     if configuration.corrective_level(alerter) is None:
         said.append(
             f"no level of the alerter {alerter.name} has the region "
@@ -203,7 +203,7 @@ class DaidalusGuidance(Component):
 
     def warnings(self) -> list[str]:
         """Say where no alert reaches its level, or no level has bands."""
-        said = never_reached("level", self.p.level, self.context.producers)
+        said = note_unreached_level("level", self.p.level, self.context.producers)
         if all(level.region == "NONE" for level in self._alerter.levels):
             said.append(f"no level of the alerter {self._alerter.name} has a region: no bands")
         return said

@@ -118,7 +118,7 @@ class VoltagePotential(Component):
                 goal=self._goal(place[:, rows], yaw),
                 last_mps=np.full((2, len(rows)), math.nan),
             )
-            known = self._known.continued(new) if len(self._known) else new
+            known = self._known.latest_or_new(new) if len(self._known) else new
             seen = Others(*(part[:, rows] for part in others))
             own = own_mps[:, rows]
             now = conflicts(seen, self._kept) & heard[rows]
@@ -136,11 +136,11 @@ class VoltagePotential(Component):
             told = (velocity != known.last_mps).any(axis=0) & np.isfinite(velocity[0])
             commanded[:, rows[told]] = velocity[:, told]
             newer = known.with_columns(active=active.T.copy(), last_mps=velocity)
-            self._known = self._known.after(run, newer, wake.first_run)
+            self._known = self._known.replace_runs(run, newer, wake.first_run)
         return self._velocities(wake, commanded)
 
     def _undisturbed_velocity(self, known: KeyedTable, place: FloatArray) -> FloatArray:
-        """Return the velocity (2, n) of who has no conflict."""
+        """Return the velocity (2, n) to fly without a conflict."""
         if self.p.goal_m is None:
             return self.p.speed_mps * np.stack([np.sin(known.track), np.cos(known.track)])
         north, east, _ = line_of_sight_ned(*place, *known.goal, validate=False)

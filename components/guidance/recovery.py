@@ -93,7 +93,7 @@ class _Search:
         sizes, shrinks = np.array(self._sizes), np.zeros(count, dtype=np.int64)
 
         def smaller(rows: IntArray) -> IntArray:
-            """Make the cylinders of rows smaller; return those of whom another is looked at."""
+            """Shrink the cylinders of rows; return the rows for which a smaller one is tried."""
             ends = np.ones(len(rows), dtype=bool)
             if values["ca_bands"]:
                 reduced = sizes[:, rows] * (1.0 - values["ca_factor"])

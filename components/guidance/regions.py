@@ -86,13 +86,13 @@ class Regions:
         return self._conflicts[key]
 
     def concerned_intruders(self, region: str) -> tuple[BoolArray, list[Concerned]]:
-        """Return for whom any level has the region, and whose volumes count."""
+        """Return which intruders any level assigns to the region, and the volumes that count."""
         if region not in self._concerned:
             self._concerned[region] = self._find_concerned(region)
         return self._concerned[region]
 
     def clear(self, region: str) -> tuple[BoolArray, BoolArray]:
-        """Return for whom any level has the region, and which values (n, k) lead clear of it."""
+        """Return which rows any level assigns to the region, and which values (n, k) avoid it."""
         known, concerned = self.concerned_intruders(region)
         clear = self._kind.there.copy()
         for one in concerned:
@@ -101,11 +101,11 @@ class Regions:
         return known, clear
 
     def leads(self, clear: BoolArray) -> BoolArray:
-        """Tell of whom any interval of values is clear: two neighbours within the limits."""
+        """Return which rows have an interval of clear values: two neighbours within the limits."""
         return has_interval(self._kind, clear)
 
     def is_in_corrective(self) -> BoolArray:
-        """Tell who is inside the corrective volume of an intruder now."""
+        """Return which ownships are inside the corrective volume of an intruder now."""
         inside = np.zeros(len(self._own.up_m), dtype=bool)
         for index, intruder in enumerate(self._intruders):
             level = self._configuration.corrective_level(intruder.alerter)

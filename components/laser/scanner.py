@@ -275,7 +275,7 @@ class ScanningLaser(SweepingSensor):
         strength = np.maximum(strength, self.threshold)
         snr_db = 20.0 * np.log10(strength)
         extras: dict[str, AnyArray] = {"snr_db": snr_db}
-        if self._says_looks:
+        if self._is_asked_for_looks:
             extras["detection_probability"] = probability
         above_db = snr_db - 20.0 * math.log10(self.threshold)
         return Look(detected, above_db, extras, {"amplitude": strength})

@@ -53,7 +53,7 @@ def flown_as_steered(own: Sequence[Any], steering: Sequence[Steering]) -> list[S
     for turn in range(max(map(len, steering), default=0)):
         now = [number for number, one in enumerate(steering) if len(one) > turn]
         times_s = np.array([steering[number][turn][0] for number in now])
-        flights = flights.steered(
+        flights = flights.add_manoeuvres(
             np.array(now), times_s, [steering[number][turn][1] for number in now]
         )
     return list(flights)
@@ -97,16 +97,18 @@ class FlownMetric(TargetMetric):
             self.tables = {**self.tables, "manoeuvres": ("block", "time_s", *_COLUMNS)}
 
     def flights_seen(self, group: Group, number: int) -> list[Any]:
-        """Return the flights of who looks in a replica, as steered, and then of all it may see."""
+        """Return the flight of the viewing platform in a replica, as steered, then of all it may
+        see.
+        """
         source = traffic_of(group.scenes[number])[0]
         own, *others = source.seen_from(source.platforms()[self.viewer + 1])
-        told = _by_platform(self._told(group).get(number, ()))
+        told = _by_platform(self._received_manoeuvres(group).get(number, ()))
         places = [place for place in range(len(source.targets)) if place not in source.unseen]
         places = sorted({*places, self.viewer} - {-1})
         flights = [own, *others]
         of_each = [self.viewer, *(-1 if place == self.viewer else place for place in places)]
         for at, place in enumerate(of_each):
-            if there := _while_there(place, flights[at], told.get(place, ())):
+            if there := _limit_to_presence(place, flights[at], told.get(place, ())):
                 name = flights[at].name
                 (flights[at],) = flown_as_steered([flights[at]], [there])
                 flights[at].name = name
@@ -117,15 +119,18 @@ class FlownMetric(TargetMetric):
         return [block for block in blocks if self._on.get(block, -1) == self.viewer]
 
     def manoeuvres(self, group: Group) -> Mapping[int, Steering]:
-        """Return the manoeuvres of who looks, of every replica of a group that has any."""
-        own = {k: _by_platform(told).get(self.viewer, ()) for k, told in self._told(group).items()}
+        """Return the viewing platform's manoeuvres, by replica, for replicas with any."""
+        own = {
+            k: _by_platform(told).get(self.viewer, ())
+            for k, told in self._received_manoeuvres(group).items()
+        }
         return {k: steering for k, steering in own.items() if steering}
 
     def steered_runs(self, group: Group) -> IntArray:
         """Return the replicas in which any aircraft is steered."""
-        return np.array(sorted(self._told(group)), dtype=np.int64)
+        return np.array(sorted(self._received_manoeuvres(group)), dtype=np.int64)
 
-    def _told(self, group: Group) -> Mapping[int, list[_Told]]:
+    def _received_manoeuvres(self, group: Group) -> Mapping[int, list[_Told]]:
         """Return when each manoeuvre of every replica that has any was told, came, and what it was.
 
         In order of coming; what is told is known when all before it is.
@@ -137,7 +142,7 @@ class FlownMetric(TargetMetric):
         names = table["block"].names
         rows = zip(
             table["replica"].tolist(), table["block"].codes.tolist(), table["time_s"].tolist(),
-            *(_told_by(table, name) for name in _COLUMNS), strict=True,
+            *(_commanded_values(table, name) for name in _COLUMNS), strict=True,
         )  # fmt: skip
         for replica, block, time_s, *values in rows:
             if names[block] not in self.delays_s:
@@ -188,7 +193,7 @@ class FlownMetric(TargetMetric):
         if score == "separation":
             limits_m = [(level * radius_m, level * half_m) for level in levels]
             return self.of_flights(group, partial(first_within_s, limits_m), to_the_end=True)
-        told = self._told(group)
+        told = self._received_manoeuvres(group)
         result = np.full((len(levels), len(group)), np.inf)
         for count in range(1 + max(map(len, told.values()), default=0)):
             # As if no more than so many manoeuvres were told: known from when the last of them is.
@@ -228,7 +233,7 @@ class FlownMetric(TargetMetric):
     def _flights(
         self, group: Group, steered: bool, to_the_end: bool, some: IntArray | None = None
     ) -> tuple[list[list[RelativeFlight]], IntArray]:
-        told = self._told(group) if steered else {}
+        told = self._received_manoeuvres(group) if steered else {}
         steering = {k: _by_platform(mine) for k, mine in told.items()}
         target, step_s = getattr(self.p, "target", None), self.p.step_s
         return flights_of(
@@ -285,7 +290,7 @@ def flights_of(
             continue
         scene = group.scenes[number] if mine else group.scene
         make = partial(separations, scene, step_s, until_s, viewer)
-        flights = group.once(("separations", step_s, viewer, key), make)
+        flights = group.cached(("separations", step_s, viewer, key), make)
         runs.append([flight for flight in flights if target in (None, flight.name)])
         if alone and runs[-1]:
             steered.append(number)
@@ -293,18 +298,20 @@ def flights_of(
         (number, place, flight, there)
         for number in steered
         for place, flight in _aircraft_of(runs[run_of[number]]).items()
-        if (there := _while_there(place, flight, steering[number].get(place, ())))
+        if (there := _limit_to_presence(place, flight, steering[number].get(place, ())))
     ]
     flown = flown_as_steered([one[2] for one in told], [one[3] for one in told])
     by_run: dict[int, dict[int, SteeredFlight]] = {}
     for (number, place, *_), new in zip(told, flown, strict=True):
         by_run.setdefault(number, {})[place] = new
     for number, new_flights in by_run.items():
-        runs[run_of[number]] = [flight.flown(new_flights) for flight in runs[run_of[number]]]
+        runs[run_of[number]] = [
+            flight.replace_flights(new_flights) for flight in runs[run_of[number]]
+        ]
     return runs, run_of if some is None else run_of[some]
 
 
-def _told_by(table: Any, name: str) -> list[float]:
+def _commanded_values(table: Any, name: str) -> list[float]:
     """Return what manoeuvres say; NaN of what no block commands, such as velocities."""
     nothing = np.full(len(table["replica"]), np.nan)
     values: list[float] = table.get(name, nothing).tolist()
@@ -312,7 +319,7 @@ def _told_by(table: Any, name: str) -> list[float]:
 
 
 def _by_platform(told: Sequence[_Told]) -> dict[int, list[tuple[float, Manoeuvre]]]:
-    """Return what each aircraft is told, by its index."""
+    """Return the manoeuvres commanded to each aircraft, by its index."""
     result: dict[int, list[tuple[float, Manoeuvre]]] = {}
     for one in told:
         result.setdefault(one.steered, []).append((one.came_s, one.manoeuvre))
@@ -328,8 +335,8 @@ def _aircraft_of(run: Sequence[RelativeFlight]) -> dict[int, Any]:
     }
 
 
-def _while_there(place: int, flight: Any, steering: Steering) -> Steering:
-    """Return what an aircraft is told while it is there; the ownship always is."""
+def _limit_to_presence(place: int, flight: Any, steering: Steering) -> Steering:
+    """Return the manoeuvres commanded to an aircraft while it is present; the ownship always is."""
     if place < 0:
         return steering
     first_s, last_s = flight.interval_present()

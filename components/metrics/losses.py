@@ -50,7 +50,7 @@ def closest(flight: RelativeFlight) -> tuple[float, float, str]:
     return *best, end_of_look(best[1], looked_s, present_s, flight.end_s)
 
 
-def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
+def first_times_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
     """Return when a target first is within each (horizontal, vertical) distance, s; NaN if never.
 
     Asked at the flight's times only, and exclusive; `first_losses_s` looks between them.
@@ -139,7 +139,7 @@ def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, fl
     result = np.full((len(flights), len(limits_m)), np.nan)
     between = [number for number, flight in enumerate(flights) if flight.between_samples]
     for number in sorted(set(range(len(flights))) - set(between)):
-        result[number] = first_inside(flights[number], *limits_m)
+        result[number] = first_times_inside(flights[number], *limits_m)
     if not between:
         return result
     rows = np.array(between)
@@ -179,7 +179,7 @@ def nearest_of(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArra
 def _nearest(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]:
     together = FlightsTogether(flights)
     first_s, last_s = together.present_s()
-    best = Approaches.none(len(flights))
+    best = Approaches.unknown(len(flights))
     grids: dict[tuple[float, float], list[int]] = {}
     for number, flight in enumerate(flights):
         grids.setdefault((flight.step_s, flight.grid_end_s), []).append(number)

@@ -169,13 +169,15 @@ class Stochastic(Component):
         for index in np.flatnonzero(self._has_to_do(wake, highest)).tolist():
             run = int(runs[index])
             mind = self._minds.get(run, Mind(run))
-            mind, chooses, acts = self._followed(mind, int(wake.ticks[index]), int(highest[index]))
+            mind, chooses, acts = self._follow_level(
+                mind, int(wake.ticks[index]), int(highest[index])
+            )
             self._minds[run], self._next[run] = mind, self._next_tick(mind)
             if chooses:
                 choosing.append((index, mind))
             if acts:
                 acting.append((index, run))
-        return Manoeuvres.at_rows(wake.instants, self._sent(alerts, choosing, acting))
+        return Manoeuvres.at_rows(wake.instants, self._begin_manoeuvres(alerts, choosing, acting))
 
     def _has_to_do(self, wake: Wake, highest: IntArray) -> BoolArray:
         """Tell at which rows something may change: nothing does without an alert, now or before,
@@ -198,7 +200,7 @@ class Stochastic(Component):
             return math.floor(max(held, mind.free_from))
         return math.floor(mind.acts_at if mind.chooses_at is None else mind.chooses_at)
 
-    def _sent(
+    def _begin_manoeuvres(
         self,
         alerts: AlertLevels,
         choosing: Sequence[tuple[int, Mind]],
@@ -219,7 +221,7 @@ class Stochastic(Component):
             self._minds[run] = self._minds[run]._replace(chosen=told)
         return sent
 
-    def _followed(self, mind: Mind, tick: int, highest: int) -> tuple[Mind, bool, bool]:
+    def _follow_level(self, mind: Mind, tick: int, highest: int) -> tuple[Mind, bool, bool]:
         """Take in the highest level of an instant; return whether it chooses, and acts, at it."""
         per_s = self.context.ticks_per_s
         if highest < self.p.level:

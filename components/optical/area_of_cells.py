@@ -13,7 +13,7 @@ from components.aircraft.aspect_tables import SilhouetteTable
 from components.optical.infrared_area import infrared_area
 from components.optical.mesh import TriangleMesh
 from components.optical.silhouette import PLATE_ASPECT_RATIO, union_area, visible_area
-from components.sensor.look import Cells, turned_to_sight
+from components.sensor.look import Cells, aspect_angles_of_cells
 from dsa_des.arrays.types import FloatArray
 
 
@@ -40,7 +40,7 @@ def area_by_table(cells: Cells, of_target: Mapping[str, Sequence[Any]], model: s
     for index, item in enumerate(distinct):
         chosen = np.flatnonzero(which[cells.craft] == index)
         area[chosen] = visible_area(
-            *turned_to_sight(cells, chosen),
+            *aspect_angles_of_cells(cells, chosen),
             model=model,
             **{kind: item},
         )
@@ -188,7 +188,7 @@ def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
         meshes = [body_mesh(*map(float, body)) for body in bodies]
         return area_by_table(cells, {"mesh": meshes}, "convex_hull")
     compute: Any = infrared_area if band == "ir" else visible_area
-    view = turned_to_sight(cells)
+    view = aspect_angles_of_cells(cells)
     shown = {name: cells.of_target(column) for name, column in areas.items()}
     if len(cells) <= CELLS_AT_ONCE:
         small: FloatArray = compute(*view, model=silhouette, validate=False, **shown)

@@ -328,7 +328,7 @@ class Camera(Sensor):
         margin = sample - threshold
         seen = (margin >= 0.0) & (signature > threshold - FAINTEST_DEVIATIONS * noise)
         extras = {"pixels": pixels}
-        if self._says_looks:
+        if self._is_asked_for_looks:
             extras["detection_probability"] = detection_probability(signature, threshold, noise)
         return Look(seen, margin, extras, self.signal_of(sample, np.ones(len(cells))))
 

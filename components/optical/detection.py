@@ -17,14 +17,14 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
+    check_not_negative,
     finite,
-    not_negative,
     positive,
     refuse,
     unflatten,
 )
 from components.messages.detections import REPORT, Detections, Reporting
-from components.messages.false_detections import add_false_detections, in_measured_order
+from components.messages.false_detections import add_false_detections, sort_by_measurement
 from components.radar.detection.output import false_alarm_count
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
@@ -75,7 +75,7 @@ def detection_probability(signature: ArrayLike, threshold: ArrayLike, noise: Arr
     shape, (level, needed, deviation) = broadcast_flat(
         signature=finite("signature", signature),
         threshold=finite("threshold", threshold),
-        noise=not_negative("noise", noise),
+        noise=check_not_negative("noise", noise),
     )
     silent = deviation == 0.0
     above = (level - needed) / np.where(silent, 1.0, deviation)
@@ -181,7 +181,7 @@ class AddedFalseAlarms:
             return detections
         marked = self._block.p.marked_false_alarms
         joined = self._with_alarms(detections, marked)
-        return joined if marked else in_measured_order(joined)
+        return joined if marked else sort_by_measurement(joined)
 
     def _with_alarms(self, detections: Detections, marked: bool) -> Detections:
         block, reach = self._block, self._block.reach

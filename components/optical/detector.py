@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, InfraredAreas, Roster
 from components.aircraft.known_targets import known_targets
-from components.arguments.checks import not_negative, positive
+from components.arguments.checks import check_not_negative, positive
 from components.optical.contrast import CONTRAST, visibility_transmission
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
@@ -39,8 +39,8 @@ def centroid_variance(
     noise within the spot, N > 10 s, and the blur is half a pixel or more; a sharper spot falls
     between pixels, and a target of many pixels with sharp edges is found better than this.
     """
-    covered = np.asarray(not_negative("pixels", pixels))
-    ratio = np.asarray(not_negative("contrast_to_noise", contrast_to_noise))
+    covered = np.asarray(check_not_negative("pixels", pixels))
+    ratio = np.asarray(check_not_negative("contrast_to_noise", contrast_to_noise))
     blur = float(positive("blur_pixels", blur_pixels))
     spread = blur**2 + _PIXEL_VARIANCE * covered + _PIXEL_VARIANCE
     most = _PIXEL_VARIANCE * (covered + 1.0)
@@ -188,7 +188,7 @@ class _OneLook:
     """One cell: an aircraft at a known range, aspect and contrast, level and at our altitude."""
 
     def __init__(self, craft: Aircraft, range_m: float, aspect_rad: float) -> None:
-        self.roster = Roster.of([("calibrate", craft)])
+        self.roster = Roster.from_pairs([("calibrate", craft)])
         self.range_m = np.array([range_m])
         self.relative_heading_rad = np.array([math.pi - aspect_rad])
         self.target_pitch_rad = self.target_roll_rad = self.elevation_rad = np.zeros(1)

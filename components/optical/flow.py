@@ -103,7 +103,8 @@ def find_spot(picture: FloatArray, sought: BoolArray, spread_pixels: float, nois
 def _middle(
     stands: BoolArray, picture: FloatArray, row: int, column: int, otherwise: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return the centre of what stands out around a pixel, x and y; if that is beside it, another.
+    """Return the centroid (x, y) of the bright spot around a pixel, moved if that lies off the
+    pixel.
 
     It is weighed by the picture, as its edge covers pixels in part.
     """

@@ -111,7 +111,7 @@ class _View(NamedTuple):
 
 
 def _confidence(camera: Any, cells: Cells) -> dict[str, FloatArray]:
-    """Return how far each target stands above the threshold, in the threshold's unit."""
+    """Return each target's margin above the threshold, in the threshold's unit."""
     return {"confidence": camera.look(cells).confidence}
 
 
@@ -361,7 +361,7 @@ class ImageCamera(ElectroOptical):
         while len(self.patches) > _KEPT:
             del self.patches[next(iter(self.patches))]
 
-    def _measured(
+    def _measure(
         self, cells: Cells, detected: IntArray, look: Look, azimuth_rad: FloatArray,
         elevation_rad: FloatArray, range_m: FloatArray,
     ) -> Any:  # fmt: skip
@@ -371,7 +371,7 @@ class ImageCamera(ElectroOptical):
         known = np.isfinite(column)
         azimuth_rad = np.where(known, seen[0], azimuth_rad)
         elevation_rad = np.where(known, seen[1], elevation_rad)
-        return super()._measured(cells, detected, look, azimuth_rad, elevation_rad, range_m)
+        return super()._measure(cells, detected, look, azimuth_rad, elevation_rad, range_m)
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return what the picture says of each cell."""

@@ -15,7 +15,7 @@ from components.messages.fused import FusedDetections
 from components.messages.state_tracks import COVARIANCE, DELETED, StateTracks
 from components.sensor.marks import TRACKER
 from components.stone_soup.follower import Followed, Follower
-from components.stone_soup.library import Repeatable, needs_stone_soup
+from components.stone_soup.library import Repeatable, require_stone_soup
 from components.tracking.out_of_sequence import LookCount, latest_s
 from components.tracking.promises import ACTS_EVERY_S, Promises
 from components.tracking.reported_errors import unknown_latency
@@ -88,7 +88,7 @@ class StoneSoupTracker(Component):
 
     def setup(self) -> None:
         """Build the tracker."""
-        needs_stone_soup("tracking.stonesoup")
+        require_stone_soup("tracking.stonesoup")
         self._ahead: Scans | None = None
         self._origin: FloatArray | None = None
         self._own_m = np.zeros(3)
@@ -107,7 +107,7 @@ class StoneSoupTracker(Component):
         self._repeatable = Repeatable(
             key_of(getattr(self.context.streams, "seed", 0), self.name, "stone soup")
         )
-        self._tracker = self._built()
+        self._tracker = self._build_tracker()
 
     def warnings(self) -> list[str]:
         """Say whose errors last from look to look, which Stone Soup takes for new ones."""
@@ -125,7 +125,7 @@ class StoneSoupTracker(Component):
                              "too sure where errors are the same again")  # fmt: skip
         return super().warnings() + said
 
-    def _built(self) -> Any:
+    def _build_tracker(self) -> Any:
         name = self.p.builder
         try:
             build = load_named(name, f"blocks.{self.name}.builder")
@@ -164,9 +164,9 @@ class StoneSoupTracker(Component):
                     self._count = self._count.with_looks(self._sensors, look, slice(0), [0])
                     continue
                 in_time = True
-                here |= {one.number: one for one in self._looked(look, pose, wake)}
+                here |= {one.number: one for one in self._process_look(look, pose, wake)}
             if not in_time and self._is_silent(tick):
-                ended = self._handed_over(tick - self._wait_ticks, wake, set())
+                ended = self._process_instant(tick - self._wait_ticks, wake, set())
                 if any(one.status == DELETED for one in ended):
                     here, in_time = {one.number: one for one in ended}, True
             if in_time:
@@ -204,7 +204,7 @@ class StoneSoupTracker(Component):
         quiet = tick - self._wait_ticks - self._looked_tick
         return bool(self._follower) and self._ahead is None and quiet >= self._quiet_ticks
 
-    def _looked(self, look: Scans, pose: SensorPose, wake: Wake) -> "list[Followed]":
+    def _process_look(self, look: Scans, pose: SensorPose, wake: Wake) -> "list[Followed]":
         """Hand one look over, and return the tracks after it."""
         from components.stone_soup.objects import Poses, detections, instant
 
@@ -218,9 +218,9 @@ class StoneSoupTracker(Component):
         )  # fmt: skip
         self._masks.update(zip(names, masks, strict=True))
         self._looked_tick, self._own_m = tick, pose.position_m[:, 0]
-        return self._handed_over(tick, wake, result)
+        return self._process_instant(tick, wake, result)
 
-    def _handed_over(self, tick: int, wake: Wake, found: "set[Any]") -> "list[Followed]":
+    def _process_instant(self, tick: int, wake: Wake, found: "set[Any]") -> "list[Followed]":
         """Hand over what was detected at an instant, and return the tracks after it."""
         from components.stone_soup.objects import instant
 
@@ -228,7 +228,7 @@ class StoneSoupTracker(Component):
         when, self._newest = instant(time_s), tick
         with self._repeatable.working():
             _, tracks = self._tracker.update_tracker(when, found)
-            return self._follower.after(tracks, time_s, when, self._masks)
+            return self._follower.follow_look(tracks, time_s, when, self._masks)
 
     def _message(
         self, wake: Wake, rows: list[int], entries: "list[tuple[int, FloatArray, Followed]]"

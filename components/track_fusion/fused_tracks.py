@@ -24,7 +24,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import offsets_of
 
 
-def fused_states(
+def fuse_states(
     tracks: LocalTracks, time_s: FloatArray, motion: ConstantVelocity, rule: Rule
 ) -> KeyedTable:
     """Return the fused tracks to which tracks belong, by replica and number (``track``).
@@ -38,7 +38,7 @@ def fused_states(
     leader, of = leaders(tracks)
     count = len(leader)
     rank = _ranks(tracks, of)
-    state, covariance = tracks.at(time_s, motion)
+    state, covariance = tracks.predict_to(time_s, motion)
     x, p = state[:, leader].copy(), covariance[:, :, leader].copy()
     for turn in range(1, int(rank.max(initial=0)) + 1):
         member = np.flatnonzero((rank == turn) & tracks.ranged[leader[of]])
@@ -105,14 +105,14 @@ _NUMBERS = (
 )  # fmt: skip
 
 
-def no_fused_tracks() -> KeyedTable:
+def empty_fused_tracks() -> KeyedTable:
     """Return the columns of no track."""
     shapes = {"state": (6,), "covariance": (6, 6), "own": (3,), "origin": (3,)}
     floats = dict.fromkeys((*_NUMBERS, *shapes), float)
     return KeyedTable.empty({**dict.fromkeys(_WHOLE, int), **floats, "has_range": bool}, shapes)
 
 
-def reported_after(
+def update_reported(
     before: KeyedTable,
     fused: KeyedTable,
     members: LocalTracks,
@@ -159,7 +159,7 @@ def reported_after(
         row=row_of_replica[np.searchsorted(replica, last.replica)],
         track_status=np.full(len(last), DELETED),
     )
-    return KeyedTable.joined([last, new])
+    return KeyedTable.concatenate([last, new])
 
 
 def state_tracks(

@@ -67,18 +67,18 @@ def gate_share(
     none = ~(leader.ranged | other.ranged)
     if both.any():
         mine, theirs = leader.take(both), other.take(both)
-        x, p = mine.at(time_s[both], rules.motion)
-        y, q = theirs.at(time_s[both], rules.motion)
+        x, p = mine.predict_to(time_s[both], rules.motion)
+        y, q = theirs.predict_to(time_s[both], rules.motion)
         share[both] = distance_squared(cholesky(p + q), x - y) / gate_threshold(
             rules.gate_probability, 6
         )
     two = gate_threshold(rules.gate_probability, 2)
     if one.any():
         swap = other.ranged & one
-        mine = LocalTracks.joined([leader.take(one & ~swap), other.take(swap)])
-        theirs = LocalTracks.joined([other.take(one & ~swap), leader.take(swap)])
+        mine = LocalTracks.concatenate([leader.take(one & ~swap), other.take(swap)])
+        theirs = LocalTracks.concatenate([other.take(one & ~swap), leader.take(swap)])
         when = np.concatenate([time_s[one & ~swap], time_s[swap]])
-        x, p = mine.at(when, rules.motion)
+        x, p = mine.predict_to(when, rules.motion)
         angles = bearing(theirs, x, when)
         spread = multiply_by_transpose(product(angles.jacobian, p), angles.jacobian)
         for i in range(2):
@@ -87,11 +87,11 @@ def gate_share(
         where = np.concatenate([np.flatnonzero(one & ~swap), np.flatnonzero(swap)])
         share[where] = result
     if none.any():
-        share[none] = _between_bearings(rules, leader.take(none), other.take(none)) / two
+        share[none] = _bearing_distances(rules, leader.take(none), other.take(none)) / two
     return share
 
 
-def _between_bearings(rules: MatchRules, one: LocalTracks, other: LocalTracks) -> FloatArray:
+def _bearing_distances(rules: MatchRules, one: LocalTracks, other: LocalTracks) -> FloatArray:
     apart = residual(np.stack(one.direction()), np.stack(other.direction()))
     turned = (rules.bearing_rate_rad_s * (one.time_s - other.time_s)) ** 2
     level = np.maximum(np.cos(one.elevation_rad) ** 2, 1e-12)
@@ -134,7 +134,7 @@ def without_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -
     return tracks.with_columns(system=system)
 
 
-def matched(
+def match_tracks(
     rules: MatchRules,
     tracks: LocalTracks,
     time_s: FloatArray,
@@ -153,7 +153,7 @@ def matched(
     for tracker in range(trackers):
         now = tracks.with_columns(system=system)
         mine = tracks.tracker == tracker
-        alone = _alone(now)
+        alone = _is_only_member(now)
         free = np.flatnonzero(mine & ((system == 0) | alone))
         if len(free) == 0:
             continue
@@ -168,7 +168,7 @@ def matched(
     return tracks.with_columns(system=system), next_number
 
 
-def _alone(tracks: LocalTracks) -> BoolArray:
+def _is_only_member(tracks: LocalTracks) -> BoolArray:
     """Return which tracks are the only member of their fused track."""
     result = np.zeros(len(tracks), dtype=bool)
     member = np.flatnonzero(tracks.system > 0)

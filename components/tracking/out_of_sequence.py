@@ -160,7 +160,7 @@ def tracks_before(
         store = before[look].store
         by_store.setdefault(id(store), (store, []))[1].append(replica)
     parts = [store.take(np.isin(store.replica, mine)) for store, mine in by_store.values()]
-    return TrackStore.joined(parts).in_order()
+    return TrackStore.concatenate(parts).sort()
 
 
 # Looks whose fate is worked out.

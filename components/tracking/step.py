@@ -51,7 +51,7 @@ def step(
         new, next_number = initiate_tracks(rules, batch, ~held, next_number)
         parts.append(new)
     # A single part is in the order that the store has.
-    store = parts[0] if len(parts) == 1 else TrackStore.joined(parts).in_order()
+    store = parts[0] if len(parts) == 1 else TrackStore.concatenate(parts).sort()
     return store, next_number
 
 
@@ -142,13 +142,15 @@ def late_step(
 
 
 def _sort_tracks(parts: list[TrackStore]) -> TrackStore:
-    return TrackStore.joined(parts).sorted_by_key()
+    return TrackStore.concatenate(parts).sorted_by_key()
 
 
 def _match_earlier_tracks(
     before: TrackStore, now: TrackStore, tick: IntArray
 ) -> tuple[IntArray, BoolArray]:
-    """Return where tracks stand among those of before, and which speak of `tick` at the latest."""
+    """Return each track's index among the earlier tracks, and which have a state no later than
+    `tick`.
+    """
     if len(before) == 0:
         return np.zeros(len(now), dtype=np.int64), np.zeros(len(now), dtype=bool)
     keys, key = before.key, now.key
@@ -160,7 +162,9 @@ def _match_earlier_tracks(
 def _retrodict(
     rules: TrackerRules, now: TrackStore, old: TrackStore | None, tick: IntArray
 ) -> tuple[TrackStore, list[Retrodiction], FloatArray]:
-    """Return the tracks at an instant that is past, what became of them since, and of models."""
+    """Return the tracks predicted back to a past instant, the retrodictions, and model
+    probabilities.
+    """
     since_s = (now.tick - tick) / rules.ticks_per_s
     present = zip(rules.estimator.models, now.states(), now.covariances(), strict=True)
     if old is None:

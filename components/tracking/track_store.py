@@ -93,7 +93,7 @@ class TrackStore(KeyedTable):
         if len(gone) == 0:
             return self
         ended = gone.with_columns(status=np.full(len(gone), DELETED))
-        return self.joined([self, ended]).sorted_by_key()
+        return self.concatenate([self, ended]).sorted_by_key()
 
     def estimates(self) -> Estimates:
         """Return what the filter knows of the tracks."""
@@ -184,7 +184,7 @@ def _by_row(reported: Sequence[TrackStore]) -> TrackStore:
     parts = [part.columns for part in reported]
     row = np.concatenate([part["row"] for part in parts])
     if not bool((row[1:] < row[:-1]).any()):
-        return TrackStore.joined(reported)
+        return TrackStore.concatenate(reported)
     order = np.argsort(row, kind="stable")
     columns = {}
     for name in parts[0].keys() - _UNSHOWN:

@@ -241,7 +241,7 @@ class Tracker(Component):
         scans, self._ahead = split_due_looks(came, self._ahead, busy)
         if len(scans) == 0:
             return [], _NO_ROWS
-        records = self._records.continued(records_of(scans.run, scans.pose[:3]))
+        records = self._records.latest_or_new(records_of(scans.run, scans.pose[:3]))
         store = self._store.take(self._store.replica >= wake.first_run)
         begin, before, waiting = 0, dict[int, Snapshot](), None
         if self._past is not None:
@@ -281,7 +281,7 @@ class Tracker(Component):
             if len(store) and len(some := works[begins[works]]):
                 alive = store.status != DELETED
                 alive &= np.isin(store.replica, records.replica[plan.of[some]])
-                shown_last = TrackStore.joined([shown_last, store.take(alive)])
+                shown_last = TrackStore.concatenate([shown_last, store.take(alive)])
             late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
             if len(late):
                 of_late = plan.of[late]
@@ -314,7 +314,7 @@ class Tracker(Component):
                 shown_last = shown_last.take(~of_shown)
             if len(told) and len(shown):
                 reported.append(tracks_to_report(told, records.take(plan.of[shown]), row[shown]))
-        self._records = self._records.after(records.replica, records, wake.first_run)
+        self._records = self._records.replace_runs(records.replica, records, wake.first_run)
         self._store = store
         if self._remembers:
             self._past = Past.from_looks(scans, kept, before, waiting)
@@ -324,12 +324,12 @@ class Tracker(Component):
     def _note(self, came: Scans, reported: list[TrackStore]) -> None:
         """Note in which runs something was detected, and a track confirmed."""
         detected = came.run[np.diff(came.offsets) > 0]
-        self._tries = self._tries.with_more(
+        self._tries = self._tries.add_tries(
             detected, np.ones_like(detected), np.zeros(len(detected), dtype=bool)
         )
         for part in reported:
             sure = part.replica[part.status == CONFIRMED]
-            self._tries = self._tries.with_more(
+            self._tries = self._tries.add_tries(
                 sure, np.ones_like(sure), np.ones(len(sure), dtype=bool)
             )
 
@@ -348,7 +348,7 @@ class Tracker(Component):
             replicas = records.replica[of]
             others = store.take(~np.isin(store.replica, replicas))
             old = tracks_before(before, back, replicas.tolist())
-            store = TrackStore.joined([others, old]).in_order()
+            store = TrackStore.concatenate([others, old]).sort()
             records.next_number[of] = [before[look].next_number for look in back]
         for work in works.tolist():
             number = int(records.next_number[plan.of[work]])

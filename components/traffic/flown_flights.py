@@ -14,7 +14,7 @@ import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.flights.culling import NearIntervals
-from components.flights.fleet import Fleet, in_rows
+from components.flights.fleet import Fleet, assemble_rows
 from components.flights.many_flights import SteeredFleet
 from components.geometry import TrajectoryState
 from components.messages.steering import Manoeuvre
@@ -90,7 +90,7 @@ class WithOthers(Fleet):
             states.append(others.each(run[mine], time_s[mine]))
         rows.append(np.flatnonzero(left))
         states.append(self._targets.each(aircraft[left], time_s[left]))
-        return in_rows(rows, states)
+        return assemble_rows(rows, states)
 
 
 class FlightsOfRuns(NamedTuple):
@@ -157,7 +157,7 @@ class FlownFlights:
         }
 
     def seen_from(self, viewer: int) -> tuple[Fleet, Fleet]:
-        """Return the flights of who looks, and of its targets, without any manoeuvre."""
+        """Return the viewing platform's flight and its targets' flights, without manoeuvres."""
         own = self.platforms[viewer].nominal
         if viewer < 0:
             return own, self.targets
@@ -165,8 +165,8 @@ class FlownFlights:
 
     def as_flown(self) -> Fleet:
         """Return the flights of the targets with all manoeuvres."""
-        steered = self.steered_targets
-        return WithOthers(self.targets, self.width, steered) if steered else self.targets
+        steer = self.steered_targets
+        return WithOthers(self.targets, self.width, steer) if steer else self.targets
 
     def platform_at(
         self,
@@ -201,12 +201,12 @@ class FlownFlights:
         for crabbing in self.crabbing:
             speed_mps = self.targets.ground_speeds_mps(target, time_s)
             state = crabbing(state, speed_mps, self.targets.fixed_attitudes_rad(target, time_s))
-        if not (steered := self.steered_targets):
+        if not (steer := self.steered_targets):
             return state
         run, column = np.divmod(target, self.width)
         values = [part.copy() for part in state.arrays()]
         for place, index in enumerate(self.platforms):
-            if index in steered and len(mine := np.flatnonzero(column == index)):
+            if index in steer and len(mine := np.flatnonzero(column == index)):
                 counts = None if known is None else known[mine, place]
                 flown = self.platform_at(index, run[mine], time_s[mine], counts)
                 for part, new in zip(values, flown.arrays(), strict=True):
@@ -318,7 +318,7 @@ def due_manoeuvres(wake: Wake, pending: Coming) -> tuple[Coming, Coming]:
     return pending.take(due), pending.take(~due)
 
 
-def steered(
+def steer(
     own: SteeredFleet, due: Coming, wake: Wake, run: IntArray
 ) -> tuple[SteeredFleet, IntArray]:
     """Return a platform that flies what has come, and how many manoeuvres each row of runs knows.
@@ -328,12 +328,12 @@ def steered(
     known: IntArray = own.manoeuvre_count[run]
     for one in turns(due.replica):  # the first of every run, then the next
         ownship, ticks = due.replica[one], due.tick[one]
-        own = own.steered(ownship, ticks / wake.ticks_per_s, due.manoeuvre[:, one].T)
-        known = known + _at_or_after(run, wake.ticks, ownship, ticks)
+        own = own.add_manoeuvres(ownship, ticks / wake.ticks_per_s, due.manoeuvre[:, one].T)
+        known = known + _is_at_or_after(run, wake.ticks, ownship, ticks)
     return own, known
 
 
-def _at_or_after(run: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray) -> IntArray:
+def _is_at_or_after(run: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray) -> IntArray:
     """Return 1 for the rows of some ownships at or after what came for each of them."""
     order = np.argsort(ownship)
     index = np.minimum(np.searchsorted(ownship[order], run), len(ownship) - 1)

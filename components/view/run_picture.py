@@ -43,7 +43,7 @@ def run_picture(folder: Path) -> RunPicture:
     known = ("truth", "detections", "alerts")
     names = sorted({text for table in known for text in _texts(run, table, "target")})
     targets = {name: number for number, name in enumerate(names)}
-    own_s, own = _own(run)
+    own_s, own = _ownship_poses(run)
     plane = TangentPlane(float(own[0, 0]), float(own[1, 0])) if len(own_s) else _NOWHERE
     sensors = sorted(_texts(run, "scans", "block") | _texts(run, "detections", "block"))
     marks = block_marks(run.block_types(sensors))
@@ -64,7 +64,7 @@ def run_picture(folder: Path) -> RunPicture:
         return result | _sources(run, table)
 
     tables = picture.tables
-    tables["own"] = _own_columns(own_s, own, plane)
+    tables["own"] = _ownship_columns(own_s, own, plane)
     if "truth" in run.tables:
         tables["truth"] = _truth(run, plane, targets)
     tables["scans"] = {
@@ -77,7 +77,7 @@ def run_picture(folder: Path) -> RunPicture:
         "sensor": _codes(run.texts("detections", "block"), sensors),
         "target": _codes(run.texts("detections", "target"), targets),
         "scan": run.values("detections", "scan"),
-        **_seen(run, "detections", run.stacked("detections", POSE), plane),
+        **_lines_of_sight(run, "detections", run.stack_columns("detections", POSE), plane),
     }
     for name in ("fused", "tracks"):
         if run.has(name, "azimuth_rad"):
@@ -86,7 +86,7 @@ def run_picture(folder: Path) -> RunPicture:
                 **about(name),
                 **plain(name, "age_s"),
                 "time_s": time_s,
-                **_seen(run, name, _pose_at(own_s, own, time_s), plane),
+                **_lines_of_sight(run, name, _pose_at(own_s, own, time_s), plane),
             }
     if "tracks" in tables:
         picture.trackers = _blocks(run, "tracks")
@@ -99,7 +99,7 @@ def run_picture(folder: Path) -> RunPicture:
             "level": run.values("alerts", "level"), **plain("alerts", *_LEVELS),
         }  # fmt: skip
         if run.has("alerts", "track"):
-            tables["alerts"]["track"] = _whole(run.values("alerts", "track"))
+            tables["alerts"]["track"] = _track_numbers_of(run.values("alerts", "track"))
     if "manoeuvres" in run.tables:
         tables["manoeuvres"] = plain("manoeuvres", "time_s", "turn_rad", "climb_m")
     if "bands" in run.tables:
@@ -148,7 +148,7 @@ def _sources(run: RecordedTables, table: str) -> dict[str, AnyArray]:
     return {"source": _codes(run.texts(table, "block"), names)} if names else {}
 
 
-def _whole(column: Any) -> AnyArray:
+def _track_numbers_of(column: Any) -> AnyArray:
     """Return numbers of tracks, -1 where there is none."""
     numbers = np.asarray(column, dtype=float)
     return np.where(np.isfinite(numbers), numbers, _NO_TARGET).astype(np.int64)
@@ -181,7 +181,7 @@ def _sensor(name: str, block: dict[str, Any], mark: Mark) -> dict[str, Any]:
     return result
 
 
-def _own(run: RecordedTables) -> tuple[FloatArray, FloatArray]:
+def _ownship_poses(run: RecordedTables) -> tuple[FloatArray, FloatArray]:
     """Return the ownship's poses (6, n) and their times, in order: the truth, or its belief."""
     table, names, rows = "detections", list(POSE), np.arange(run.tables["detections"].num_rows)
     true = [name.removeprefix("own_") for name in POSE]
@@ -190,10 +190,12 @@ def _own(run: RecordedTables) -> tuple[FloatArray, FloatArray]:
         if mine.any():
             table, names, rows = "truth", true, np.flatnonzero(mine)
     time_s, first = np.unique(run.numbers(table, "time_s")[rows], return_index=True)
-    return time_s, run.stacked(table, names, rows[first])
+    return time_s, run.stack_columns(table, names, rows[first])
 
 
-def _own_columns(time_s: FloatArray, own: FloatArray, plane: TangentPlane) -> dict[str, AnyArray]:
+def _ownship_columns(
+    time_s: FloatArray, own: FloatArray, plane: TangentPlane
+) -> dict[str, AnyArray]:
     east, north = plane.east_north_m(*own[:3])
     return {
         "time_s": time_s,
@@ -237,8 +239,8 @@ def _estimates(
         return run.numbers("state_tracks", name)[keep]
 
     time_s = column("time_s")
-    origin = run.stacked("state_tracks", ORIGIN, keep)
-    ends = offset_positions(run.stacked("state_tracks", POSITION, keep), origin)
+    origin = run.stack_columns("state_tracks", ORIGIN, keep)
+    ends = offset_positions(run.stack_columns("state_tracks", POSITION, keep), origin)
     east, north = plane.east_north_m(*ends)
     from_east, from_north = plane.east_north_m(*_pose_at(own_s, own, time_s)[:3])
     turned = plane.turned_rad(origin)
@@ -274,14 +276,14 @@ def _pose_at(own_s: FloatArray, own: FloatArray, time_s: FloatArray) -> FloatArr
     return np.stack([np.append(values, np.nan)[row] for values in own])
 
 
-def _seen(
+def _lines_of_sight(
     run: RecordedTables, table: str, pose: FloatArray, plane: TangentPlane
 ) -> dict[str, AnyArray]:
     """Return where measured lines of sight point, and where they end if they have a range.
 
     Bearings are from north; what is not known is NaN.
     """
-    line = run.stacked(table, LINE)
+    line = run.stack_columns(table, LINE)
     from_east, from_north = plane.east_north_m(*pose[:3])
     bearing, end = sights(line, pose)
     east_m, north_m = plane.east_north_m(*end)

@@ -13,7 +13,7 @@ from dsa_des.answers.report import AnswerReport, print_report
 from dsa_des.answers.turns import Batch, TurnTimes, run_in_turns, turns_of
 from dsa_des.answers.verdicts import BEYOND, NOTHING, OPEN, Limit, parse_limits
 from dsa_des.commands.cost import CostProgress
-from dsa_des.commands.study import as_sets, check_workers, result_names
+from dsa_des.commands.study import check_workers, options_as_sets, result_names
 from dsa_des.costs.output import write_table
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
@@ -22,7 +22,7 @@ from dsa_des.record.run_folder import write_run_json
 from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.record import Result
 from dsa_des.results.rows import Rows, StoredRows
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.identity import description_text, results_of
 from dsa_des.studies.study import Study, command_of
@@ -51,7 +51,7 @@ def cost_at_the_answer(
     whole_chain: bool,
     map_name: str | None,
 ) -> None:
-    """Run a study with each model in turn, write tables and print what they come to.
+    """Run a study with each model in turn, write the tables and print the verdicts.
 
     After ctrl-C the turns that are finished are kept; exit code 130.
     """
@@ -63,15 +63,15 @@ def cost_at_the_answer(
         raise UsageError(f"--answer {answers[0]}: give a STUDY (dsa-des examples lists those that "
                          "are shipped)")  # fmt: skip
     check_workers(workers)
-    path = chosen_file(scene, "study")
-    sets = (*sets, *as_sets(swaps, seed, None))
+    path = find_input_file(scene, "study")
+    sets = (*sets, *options_as_sets(swaps, seed, None))
     sets = sets if duration is None else (*sets, f"set.duration_s={duration}")
     described = read_study(path, sets=sets)
     words = ["cost", *(word for name in answers for word in ("--answer", name))]
     words += [word for text in listed for word in ("--vary", text)]
     described.repeat = command_of(words, sets, described.path)
     answer = AnswerOfStudy(described, answers, block, listed, budgets, repeats)
-    target = OutputFolder.chosen(out, Path("runs"), f"{path.stem}-cost")
+    target = OutputFolder.from_option(out, Path("runs"), f"{path.stem}-cost")
     progress = CostProgress(silent=as_json)
     workers = workers or default_workers()
     with target.writing() as folder:
@@ -83,7 +83,11 @@ def cost_at_the_answer(
         write_table(folder / "answer.parquet", rows)
         write_file(folder / "answer.csv", _csv(rows))
         said = {name: report.sentences(name) for name in report.verdicts}
-        content: dict[str, Any] = {"rows": rows, "sentences": said, "notes": report.about()}
+        content: dict[str, Any] = {
+            "rows": rows,
+            "sentences": said,
+            "notes": report.notes_on_tables(),
+        }
         write_run_json(folder, {"title": described.title, "cost": content})
     if as_json:
         say_json(rows)
@@ -175,11 +179,11 @@ class AnswerOfStudy:
             )
 
         def after(done: int) -> list[int]:
-            left = self._left() if done == 1 else list(range(1 + models))
+            left = self._remaining_models() if done == 1 else list(range(1 + models))
             if done > 1:
                 left = [k for k in left if self._name(k) not in self._failed]
             report = self.report()
-            progress.say(f"{self.done_text()}: {_how_many(report)}", always=done < turns)
+            progress.say(f"{self.done_text()}: {_count_text(report)}", always=done < turns)
             return left
 
         try:
@@ -200,8 +204,8 @@ class AnswerOfStudy:
     def _name(self, model: int) -> str:
         return str(self.study.axes[-1].labels[model])
 
-    def _left(self) -> list[int]:
-        """Return the models that gave something in the first turn, and keep why others did not."""
+    def _remaining_models(self) -> list[int]:
+        """Return the models that gave results in the first turn, and keep why the others failed."""
         assert self._folder is not None
         for table in self._folder.each_part():
             errors = table["error"].to_pylist()
@@ -224,7 +228,7 @@ class AnswerOfStudy:
         return f"{sum(many >= models for many in each)} of {len(self._batches)} turns"
 
     def report(self) -> AnswerReport:
-        """Return what the runs so far come to."""
+        """Return the report on the runs made so far."""
         study, folder = self.study, self._folder
         assert folder is not None
         rows = Rows(StoredRows(folder), [axis.column for axis in study.axes], study.over)
@@ -252,9 +256,9 @@ class AnswerOfStudy:
         )
 
 
-def _how_many(report: AnswerReport) -> str:
+def _count_text(report: AnswerReport) -> str:
     every = [verdict for some in report.verdicts.values() for verdict in some]
-    taken = sum(verdict.may_be_taken for verdict in every)
+    taken = sum(verdict.is_acceptable for verdict in every)
     kinds = [(BEYOND, "beyond the limit"), (OPEN, "open"), (NOTHING, "not compared")]
     parts = [f"{taken} of {len(every)} may be taken"]
     parts += [

@@ -13,7 +13,7 @@ from components.estimation.measurement import (
 )
 from components.geometry.attitude import body_angles, body_to_ned, unit_vector
 from components.geometry.sensor_axes import rotate_variances
-from components.surveillance.believed_line import OwnBelief, in_body, variances_in_body
+from components.surveillance.believed_line import OwnBelief, ned_to_body_angles, variances_in_body
 
 
 def spread_of(function, at, covariance):
@@ -57,7 +57,7 @@ def test_of_a_position_that_a_banked_ownship_is_told(random):
     covariance = turn.T @ np.diag([across, along, down]) @ turn
 
     def seen(offset):
-        return np.concatenate(in_body(own, offset[:, np.newaxis]))
+        return np.concatenate(ned_to_body_angles(own, offset[:, np.newaxis]))
 
     assert np.concatenate([*found.values()]) == pytest.approx(
         spread_of(seen, ned, covariance), rel=1e-4

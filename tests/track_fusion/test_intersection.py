@@ -138,7 +138,7 @@ def test_a_direction_leaves_beyond_three_times_its_own_gate():
 
 def test_a_pair_s_distance_is_its_own_whoever_stands_beside_it():
     random = np.random.default_rng(2)
-    some = LocalTracks.joined([
+    some = LocalTracks.concatenate([
         tracks_of(
             state=random.normal(0.0, 500.0, (6, 3)), ranged=random.random(3) < 0.5,
             azimuth_rad=random.uniform(-3.0, 3.0, 3), elevation_rad=random.uniform(-1.4, 1.4, 3),

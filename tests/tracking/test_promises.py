@@ -11,7 +11,11 @@ from wired import chain, rows, run
 
 import dsa_des
 from components.messages.detections import promises_of_looks
-from components.surveillance.reception import certain, do_365, time_to_receive_s
+from components.surveillance.reception import (
+    certain,
+    do_365_reception_probability,
+    time_to_receive_s,
+)
 from components.tracking.promises import Promises
 from components.tracking.scans import Scans
 from dsa_des.running.simulation import Simulation
@@ -180,7 +184,9 @@ def test_a_given_time_is_that_time():
 
 def test_messages_promise_what_they_do():
     """95 % within 3 s and 7 s is what DO-365 says, and what its law is made of."""
-    near, far = time_to_receive_s(do_365(np.array([9.0, 11.0]) * NAUTICAL_MILE_M))
+    near, far = time_to_receive_s(
+        do_365_reception_probability(np.array([9.0, 11.0]) * NAUTICAL_MILE_M)
+    )
     assert (near, far) == pytest.approx((3.0 + 0.2, 7.0 + 0.2))
     assert time_to_receive_s(certain(np.zeros(1))) == pytest.approx([0.7])
     assert time_to_receive_s(np.zeros(1)) == [60.0]

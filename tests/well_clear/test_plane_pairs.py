@@ -77,7 +77,7 @@ def test_distances_hold_to_what_the_margin_allows_for() -> None:
     paths = turning_pairs(np.random.default_rng(3), 20, 4.2e4, 19e3)
     at_m = np.array([PairsInPlane(paths)._level_m[:, k] for k in range(20)])
     for k in range(20):
-        true_m = relative(paths, k).at(paths.time_s).horizontal_m
+        true_m = relative(paths, k).separation_at(paths.time_s).horizontal_m
         assert (np.abs(at_m[k] - true_m) <= 1e-4 * true_m + 0.7).all()
 
 

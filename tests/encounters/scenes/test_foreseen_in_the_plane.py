@@ -73,7 +73,7 @@ def test_the_plane_and_the_flights_give_the_same(
     monkeypatch.setattr(risk_metric.RiskRatios, "_of_nominal", counted)
     in_plane = foreseen(tmp_path)
     assert sum(asked) < 60, "few are asked of the flights"
-    monkeypatch.setattr(risk_metric, "met_in_plane", lambda *_: None)
+    monkeypatch.setattr(risk_metric, "meetings_in_plane", lambda *_: None)
     flown = foreseen(tmp_path)
     assert asked[-1] == 200
     for name, values in flown.items():
