@@ -70,11 +70,11 @@ class RegularTimes:
         guess = np.minimum(np.maximum(first_s, 0.0), self.duration_s) / self.step_s
         first = np.maximum(guess.astype(np.int64) - 1, 0)
         for _ in range(3):  # the division and the rounding are wrong by less than a step each
-            first += self.at(target, first) < first_s
+            first += self.time_of(target, first) < first_s
         guess = np.minimum(np.maximum(last_s, -self.step_s), self.duration_s) / self.step_s
         last = np.minimum(np.floor(guess).astype(np.int64) + 1, end)
         for _ in range(3):
-            last -= self.at(target, last) > last_s
+            last -= self.time_of(target, last) > last_s
         return first, last
 
 
