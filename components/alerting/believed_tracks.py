@@ -6,6 +6,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Deviations, largest
 from components.alerting.believed_positions import BelievedFlights, count_not_judged
+from components.alerting.others_tracks import OthersTracks
 from components.alerting.received import OwnPoses, ReceivedRows
 from components.estimation.frame import vectors_in_frame
 from components.geometry import east_north_m, east_north_mps, enu_to_geodetic
@@ -35,10 +36,12 @@ _OWN_VELOCITY = ("east_mps", "north_mps", "climb_mps")
 class EstimatedFlights:
     """What has come of trackers' states: confirmed and coasted tracks that have a range.
 
-    One that has had no detection for `STALE_S` is refused, whatever is still held of it.
+    One that has had no detection for `STALE_S` is refused, whatever is still held of it, and so is
+    one of the platform itself that another platform's sensor made.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, others: OthersTracks | None = None) -> None:
+        self._others = others
         #: How many tracks have no range, of how many, by run.
         self.rangeless = np.zeros((2, 0), dtype=np.int64)
         #: Where the tracks of each row begin and how many there are.
@@ -49,6 +52,7 @@ class EstimatedFlights:
             {
                 "replica": int,
                 "number": int,
+                "from_others": bool,
                 "time_s": float,
                 "updated_s": float,
                 **dict.fromkeys(_SHAPES, float),
@@ -68,6 +72,9 @@ class EstimatedFlights:
         new = KeyedTable(
             replica=run,
             number=tracks.track,
+            from_others=np.zeros(len(run), dtype=bool)
+            if self._others is None
+            else self._others.gave(tracks),
             time_s=tracks.state_s,
             updated_s=tracks.updated_s,
             state=np.array([getattr(tracks, name) for name in STATE]),
@@ -90,12 +97,16 @@ class EstimatedFlights:
         return self._rows.instants
 
     def states(
-        self, now: RunTicks, now_s: FloatArray, own_place: FloatArray
+        self,
+        now: RunTicks,
+        now_s: FloatArray,
+        own_place: FloatArray,
+        own_velocity: FloatArray | None = None,
     ) -> tuple[IntArray, IntArray, FloatArray, Deviations, FloatArray]:
         """Return the flights that are known at some instants, by instant and track.
 
         They are the instant, number, state and deviations of each, and how old its last
-        measurement is.
+        measurement is. `own_velocity` (north, east, down) tells which one is the ownship.
         """
         last = self._rows.last(now)
         some = np.flatnonzero(last >= 0)
@@ -109,7 +120,19 @@ class EstimatedFlights:
         ahead_s = now_s[instant] - tracks.time_s
         state = _project_to_plane(tracks, ahead_s, own_place[:, instant])
         deviations = _deviations(tracks.covariance, ahead_s)
-        return instant, tracks.number, state, deviations, now_s[instant] - tracks.updated_s
+        age_s = now_s[instant] - tracks.updated_s
+        given = np.flatnonzero(tracks.from_others)
+        if len(given) == 0 or self._others is None or own_velocity is None:
+            return instant, tracks.number, state, deviations, age_s
+        of = instant[given]
+        is_own, theirs = self._others.judged(
+            tracks.take(given), ahead_s[given], own_place[:, of], own_velocity[:, of], of
+        )
+        for mine, values in zip(deviations, theirs, strict=True):
+            mine[given] = values
+        kept = np.delete(np.arange(len(instant)), given[is_own])
+        deviations = Deviations(*(part[kept] for part in deviations))
+        return instant[kept], tracks.number[kept], state[:, kept], deviations, age_s[kept]
 
 
 def _enumerate_entries(begin: IntArray, count: IntArray) -> tuple[IntArray, IntArray]:
@@ -165,8 +188,8 @@ def _deviations(covariance: FloatArray, ahead_s: FloatArray) -> Deviations:
 class BelievedTracks:
     """Tracks of one tracker over time."""
 
-    def __init__(self, targets: int) -> None:
-        self._estimates = EstimatedFlights()
+    def __init__(self, targets: int, others: OthersTracks) -> None:
+        self._estimates = EstimatedFlights(others)
         #: Where the targets are: a track is named by the nearest.
         self._true = ReceivedRows.without_rows(position_m=(targets, 3))
         #: At how many scans the ownship's velocity is not known yet, of how many, by run.
@@ -200,7 +223,9 @@ class BelievedTracks:
         moving = known.nonzero()[0]
         self._unmoving = with_cases(self._unmoving, asked.run[~known], asked.run)
         now = asked.take(moving)
-        result = self._estimates.states(now, times_s[moving], poses.place(now))
+        east, north, climb = (own[name][moving] for name in _OWN_VELOCITY)
+        velocity_m_s = np.stack([north, east, -climb])
+        result = self._estimates.states(now, times_s[moving], poses.place(now), velocity_m_s)
         scan, number, state, deviations, age_s = moving[result[0]], *result[1:]
         mine = (own[name][scan] for name in _OWN_VELOCITY)
         velocity = (own_part - part for own_part, part in zip(mine, state[3:], strict=True))

@@ -17,6 +17,7 @@ from components.alerting.believed_positions import (
 from components.alerting.believed_tracks import BelievedTracks
 from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
 from components.alerting.memory import LevelMemory
+from components.alerting.others_tracks import OthersTracks
 from components.alerting.received import OwnPoses
 from components.guidance.daidalus import ConfParameters
 from components.guidance.situation import State
@@ -48,6 +49,16 @@ class DaidalusParameters(ConfParameters, ClockedParameters):
         default=3.0, gt=0, le=60,
         description="Positions of so long give a target's flight, at least the last two, s.",
     )  # fmt: skip
+    own_gate_probability: float = Field(
+        default=0.9999, ge=0, lt=1,
+        description="Probability that the track which another platform has of this one is known "
+        "for it, by place and velocity, and not judged; 0 for never.",
+    )  # fmt: skip
+    acceleration_intensity_m2_s3: float = Field(
+        default=4.0, gt=0,
+        description="Intensity of the white acceleration with which a track that only other "
+        "platforms' sensors gave is carried on to the scan, m²/s³.",
+    )  # fmt: skip
 
     @field_validator("conf", mode="after")
     @classmethod
@@ -66,7 +77,9 @@ class DaidalusAlerting(Component):
 
     It believes tracks if it gets them, else fused lines of sight, else the truth: where the
     aircraft are. Tracks with states (`StateTracks`) are carried on straight from their last
-    estimate; their covariances count for levels that heed uncertainty. Otherwise a target's flight
+    estimate; their covariances count for levels that heed uncertainty. Those that only sensors on
+    other platforms gave grow by the time on the way and by the own position's noise, and one that
+    is at the own place with the own velocity is no intruder. Otherwise a target's flight
     is a straight line through its positions of the last seconds (at least the last two, however
     slowly they come), in the ownship's east, north and up. What has no range is left out.
     """
@@ -75,7 +88,9 @@ class DaidalusAlerting(Component):
         "states": Input(TrafficStates, "queued", "Where all aircraft are: the ownship at least."),
         "tracks": Input(Tracks, "queued", "What is held of every target.", required=False),
         "fused": Input(FusedDetections, "queued", "Fused lines of sight.", required=False),
-        "estimates": Input(StateTracks, "queued", "Tracks with states.", required=False),
+        "estimates": Input(
+            StateTracks, "queued", "Tracks with states.", required=False, between_platforms=True
+        ),
     }
     outputs = {"alerts": Output(AlertLevels, "The alert level of each target.")}
     Parameters = DaidalusParameters
@@ -106,6 +121,9 @@ class DaidalusAlerting(Component):
         self._configuration: Configuration = configuration
         self._roster: Any = None
         self._own = OwnPoses(self.context.ticks_per_s)
+        self._others = OthersTracks.of(
+            self.context, self.p.own_gate_probability, self.p.acceleration_intensity_m2_s3
+        )
         # Over which time the ownship's velocity is taken; at least its last two poses count.
         self._over_s = 0.0 if self._source == "estimates" else self.p.fit_s
         self._memory = LevelMemory(memory_rule(configuration))
@@ -157,7 +175,7 @@ class DaidalusAlerting(Component):
             self._roster = states.roster
             targets = len(states.roster)
             self._belief: BelievedTracks | BelievedPositions = (
-                BelievedTracks(targets)
+                BelievedTracks(targets, self._others)
                 if self._source == "estimates"
                 else BelievedPositions(self.p.fit_s, targets)
             )

@@ -197,10 +197,10 @@ def one_way_attenuation_db(
     if table.gas is not None:
         mean_db_km += _mean_gas(low, high, *table.gas)
     if table.rain is not None:
-        share = _share_between(low, high, -np.inf, table.rain_height_m)
+        share = share_between(low, high, -np.inf, table.rain_height_m)
         mean_db_km += share * _rain(distance, high - low, table.rain, table)
     if table.fog_db_km > 0.0:
-        mean_db_km += table.fog_db_km * _share_between(low, high, table.fog_base_m, table.fog_top_m)
+        mean_db_km += table.fog_db_km * share_between(low, high, table.fog_base_m, table.fog_top_m)
     return unflatten(mean_db_km * (distance * 1e-3), shape)
 
 
@@ -240,7 +240,7 @@ def _node(altitude_m: FloatArray, last: int) -> tuple[Any, FloatArray]:
     return below.astype(np.intp), x - below
 
 
-def _share_between(low: FloatArray, high: FloatArray, bottom: float, top: float) -> FloatArray:
+def share_between(low: FloatArray, high: FloatArray, bottom: float, top: float) -> FloatArray:
     """Return which share of the path from `low` to `high` lies between two altitudes."""
     span = high - low
     level = span == 0.0

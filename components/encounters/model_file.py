@@ -94,6 +94,11 @@ class _ModelReader:
             return f"the part {shown_value(name)} stands there twice"
         if name not in PARTS:
             return f"there is no part {shown_value(name)}{did_you_mean(name, PARTS)}"
+        if name == "boundaries" and expected == "labels_transition":
+            return (
+                "its part '# labels_transition' is missing: a model of initial states alone, as "
+                "that of encounters near aerodromes (terminal), is not flown"
+            )
         return f"the part '{name}' stands where '{expected}' is expected"
 
     def model(self) -> EncounterModel:

@@ -46,6 +46,22 @@ class TrackError(ValueError):
     """A model's tracks cannot be flown, or none of them is accepted; it names the model's file."""
 
 
+def _why_not(model: EncounterModel, label: str) -> str:
+    """Return what a model is that does not have a variable that is flown."""
+    there = {*model.labels}
+    if {"v_1", "v_2", "hmd", "vmd"} <= there:
+        return (
+            "it is a correlated model, of two aircraft at their closest approach: only models of "
+            "one aircraft (uncorrelated ones) are flown"
+        )
+    if there <= {LAYER, CLIMB}:
+        return "it is a model of balloons, which have no speed of their own: they are not flown"
+    return (
+        f"the model has no variable {label!r}{did_you_mean(label, model.labels)}: its tracks "
+        "cannot be flown"
+    )
+
+
 @dataclass(frozen=True)
 class Commands:
     """What sampled tracks command, ready to be flown: (tracks,), and (seconds + 1, tracks)."""
@@ -79,9 +95,7 @@ class TrackRules:
         for label in _FLOWN:
             if model.index_of(label) is None:
                 raise TrackError(
-                    f"{model.path}: the model has no variable {label!r}"
-                    f"{did_you_mean(label, model.labels)}: its tracks cannot be flown (--raw "
-                    "writes what it gives)"
+                    f"{model.path}: {_why_not(model, label)} (--raw writes what it gives)"
                 )
         self._layer = self._index_of(LAYER)
         bins = model.bins[self._layer]

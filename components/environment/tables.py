@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.atmosphere.pressure_altitude import STANDARD_HPA
+from components.environment.weather_cells import WeatherCell
 from components.terrain.raster import RasterFile
 from dsa_des.block.component import Parameters
 from dsa_des.time.gauss_markov import LONGEST_S
@@ -19,8 +20,8 @@ class Weather(Parameters):
 
     may_change: ClassVar[tuple[str, ...]] = (
         "gas", "vapour_density_g_m3", "rain_rate_mm_h", "rain_top_m", "fog_water_g_m3",
-        "fog_base_m", "fog_top_m", "fog_temperature_c", "visibility_km", "night", "qnh_hpa",
-        "temperature_offset_c",
+        "fog_base_m", "fog_top_m", "fog_temperature_c", "visibility_km", "cells", "night",
+        "qnh_hpa", "temperature_offset_c",
     )  # fmt: skip
 
     gas: bool = Field(
@@ -49,6 +50,11 @@ class Weather(Parameters):
         default=None,
         gt=0,
         description="Visibility (Koschmieder, 2 % contrast), km; by default from fog and rain.",
+    )
+    cells: tuple[WeatherCell, ...] = Field(
+        default=(),
+        description="Rain and fog that are somewhere, and move: [[weather.cells]]; for radars and "
+        "cameras.",
     )
 
     wind_mps: float = Field(
@@ -85,9 +91,9 @@ class Weather(Parameters):
         said = []
         if not self.wind_mps:
             said += self.idle("wind_from_deg", because="wind_mps is 0")
-        if not self.rain_rate_mm_h:
+        if not (self.rain_rate_mm_h or any(one.rain_rate_mm_h for one in self.cells)):
             said += self.idle("rain_top_m", because="rain_rate_mm_h is 0")
-        if not self.fog_water_g_m3:
+        if not (self.fog_water_g_m3 or any(one.fog_water_g_m3 for one in self.cells)):
             said += self.idle(
                 "fog_base_m", "fog_top_m", "fog_temperature_c", because="fog_water_g_m3 is 0"
             )

@@ -7,7 +7,7 @@ sample saw it. What holds at the samples, widened by that, holds all the time.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,6 +40,18 @@ _SPEED_MARGIN = 1.001
 _POSITION_MARGIN_M = 1.0
 
 
+class OwnPath(NamedTuple):
+    """Where the ownship is at times of a run, how far from there at most until halfway to the next.
+
+    `place` is latitude and longitude in degrees, and altitude in m.
+    """
+
+    time_s: FloatArray
+    place: tuple[FloatArray, FloatArray, FloatArray]
+    moves_m: float
+    half_s: float
+
+
 @dataclass(frozen=True)
 class TrafficEnvelope:
     """What the targets that come in reach, and the ownship, can do over a run.
@@ -55,6 +67,7 @@ class TrafficEnvelope:
     elevation_rad: float
     pitch_rad: float
     roll_rad: float
+    own_path: OwnPath
 
 
 def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) -> TrafficEnvelope:
@@ -76,8 +89,10 @@ def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) 
     near = range_m - apart <= REACH_MARGIN * reach_m
     latitudes, alt, turns = _place(own_state, own_moves)
     pitch, roll = attitude_extremes_rad(own)
+    place = own_state.lat_deg, own_state.lon_deg, own_state.alt_m
+    path = OwnPath(times, place, float(own_moves), half_s)
     if not near.any():
-        return TrafficEnvelope(0.0, latitudes, alt, alt, 0.0, pitch, roll)
+        return TrafficEnvelope(0.0, latitudes, alt, alt, 0.0, pitch, roll, path)
     swing = np.arcsin(np.minimum(1.0, apart / np.maximum(range_m, 1e-3)))
     steepest = float(np.max((np.abs(elevation) + swing)[near])) + turns
     low, high = states.alt_m - moves, states.alt_m + moves
@@ -89,6 +104,7 @@ def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) 
         min(0.5 * math.pi, steepest),
         pitch,
         roll,
+        path,
     )
 
 

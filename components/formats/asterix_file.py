@@ -114,6 +114,11 @@ def record_asterix(
             continue
         mine = rows.setdefault(_key(record), {})
         sample = _sample(record, kinds)
+        if abs(sample[1]) > _POLE_DEG:
+            problems.fail(
+                f"category {record.category:03d}, a latitude of {sample[1]:.0f} degrees: it is of "
+                "an old edition, which is not read, or damaged", line=k + 1,
+            )  # fmt: skip
         before = mine.get(record.time_s)
         if before is not None and np.isnan(sample[1:4]).any():
             continue
@@ -135,11 +140,12 @@ def record_asterix(
     return table.recording(
         ownship,
         lambda columns: {**columns, **enu_velocity(columns), "time": columns["time"] + day_s},
-        kind="ASTERIX", units="the units of its items", height=" or ".join(kinds),
+        kind="ASTERIX", units="the units of its items",
     )  # fmt: skip
 
 
 _AIRCRAFT = (SYSTEM_TRACKS, ADS_B)
+_POLE_DEG = 90.0
 _OWNSHIP = "OWNSHIP"
 
 

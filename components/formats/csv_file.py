@@ -43,10 +43,11 @@ from dsa_des.arrays.types import FloatArray
 _GEOMETRIC = ("geoaltitude", "altgeom", "geomaltitude", "geometricaltitude", "gnssaltitude")
 _BAROMETRIC = ("baroaltitude", "altbaro", "barometricaltitude", "pressurealtitude")
 _ANY_HEIGHT = ("alt", "altitude", "height")
-_ALTITUDES = (*_ANY_HEIGHT[:2], *_GEOMETRIC, "height", *_BAROMETRIC)
+_SEA_LEVEL = ("altitudeabovesealevel", "altitudemsl", "altmsl")
+_ALTITUDES = (*_SEA_LEVEL, *_ANY_HEIGHT[:2], *_GEOMETRIC, "height", *_BAROMETRIC)
 _ORDER: Mapping[Altitude | None, tuple[str, ...]] = {
     None: _ALTITUDES,
-    "geometric": (*_GEOMETRIC, *_ANY_HEIGHT),
+    "geometric": (*_GEOMETRIC, *_SEA_LEVEL, *_ANY_HEIGHT),
     "barometric": (*_BAROMETRIC, *_ANY_HEIGHT),
 }
 _CLIMBS = (
@@ -175,6 +176,7 @@ def record_rows(
         least=2 if stem is None else 1, repeats=plain[time] in _OF_POSITIONS,
     )  # fmt: skip
     table.notes.harmless += notes
+    nameless = 0
     for number, row in chain(ahead, rows):
         if len(row) == at + 1 and not row[-1]:
             row.pop()  # a comma at the end
@@ -187,13 +189,16 @@ def record_rows(
             row[time] = row[other]
         if is_nameless and len(row) == len(headers) - 1:
             row.append(str(stem))
+        if stem is not None and len(row) > identity and not row[identity]:
+            row[identity], nameless = stem, nameless + 1
         table.add_row(number, row)
+    if nameless:
+        table.notes.warnings.append(f"{nameless} rows have no {headers[identity]}: called {stem}")
     height = columns["alt"].header
     units = next((note.partition(": ")[0] for note in notes if f"{height} in " in note), "")
     recording = table.recording(
-        ownship, _with_velocity, kind=kind, units=units or "the units of its header",
-        height=height,
-    )  # fmt: skip
+        ownship, _with_velocity, kind=kind, units=units or "the units of its header"
+    )
     if f"{height} in m" in units and _seem_feet(recording):
         said = "all its numbers are multiples of 25, as feet are"
         recording.notes.warnings.append(

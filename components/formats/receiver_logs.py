@@ -31,20 +31,31 @@ def log_of(problems: Problems, data: bytes) -> Log | None:
     head = data[:3].lstrip(b"\xef\xbb\xbf") + data[3:4096]
     head = head.lstrip()
     callsigns: dict[str, str] = {}
-    if head.startswith((b"MSG,", b"SEL,", b"ID,,", b"AIR,", b"STA,", b"CLK,")):
+    # It may begin within a line, where somebody began to listen.
+    if re.search(rb"^(?:MSG|MLAT|SEL|ID|AIR|STA|CLK),\s*\d*,", head, re.MULTILINE):
         reports = _of_sbs(problems, data, callsigns)
         return Log("BaseStation (SBS-1) messages", _FEET, reports, callsigns)
     if not head.startswith((b"{", b"[")):
         return None
-    documents = json_documents(problems, data)
-    first = next(documents)
+    warnings: list[str] = []
+    documents = _one_by_one(json_documents(problems, data, warnings))
+    first = next(documents, (1, None))
     for marks, said, units, reader in _JSON:
         if isinstance(first[1], dict) and marks <= first[1].keys():
             reports = _reports_of_documents(
                 problems, chain([first], documents), marks, reader, callsigns
             )
-            return Log(said, units, reports, callsigns)
+            return Log(said, units, reports, callsigns, warnings=warnings)
     return None
+
+
+def _one_by_one(documents: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
+    """Give documents, and what lists of them hold."""
+    for number, one in documents:
+        if isinstance(one, list):
+            yield from ((number, part) for part in one)
+        else:
+            yield number, one
 
 
 UNKNOWN_JSON = (
@@ -54,25 +65,49 @@ UNKNOWN_JSON = (
 )
 
 
-def json_documents(problems: Problems, data: bytes) -> Iterator[tuple[int, Any]]:
-    """Give a JSON document, or those of all lines, with the lines in which they begin."""
-    lines = each_line(text_of(data, problems))
+def json_documents(
+    problems: Problems, data: bytes, warnings: list[str]
+) -> Iterator[tuple[int, Any]]:
+    """Give a JSON document, those of all lines, or one after another, and where they begin.
+
+    A last line that is cut off, of a history that is being written, is left out with a warning.
+    """
+    text = text_of(data, problems)
+    del data  # of a long history it is not held beside its text
+    lines = each_line(text)
     begins, line = next(lines, (1, ""))
     try:
         yield begins, json.loads(line)
     except (ValueError, RecursionError):
-        try:
-            yield 1, json.loads(data)
-        except (ValueError, RecursionError) as error:
-            problems.fail(f"is no JSON that can be read: {error}", line=begins)
+        yield from _over_lines(problems, text)
         return
-    del data  # of a long history it is not held beside its text
+    del text
+    cut: tuple[int, str] | None = None
     for number, line in lines:
+        if cut is not None:
+            problems.fail(cut[1], line=cut[0])
         try:
             document = json.loads(line)
         except (ValueError, RecursionError) as error:
-            problems.fail(f"is no JSON that can be read: {error}", line=number)
+            cut = number, f"is no JSON that can be read: {error}"
+            continue
         yield number, document
+    if cut is not None:
+        warnings.append(f"the last line, {cut[0]}, is cut off and was left out")
+
+
+def _over_lines(problems: Problems, text: str) -> Iterator[tuple[int, Any]]:
+    """Give JSON documents that go over lines, one after another."""
+    decoder, at, line = json.JSONDecoder(), 0, 1
+    while (found := re.compile(r"\S").search(text, at)) is not None:
+        start = found.start()
+        line += text.count("\n", at, start)
+        try:
+            document, at = decoder.raw_decode(text, start)
+        except (ValueError, RecursionError) as error:
+            problems.fail(f"is no JSON that can be read: {error}", line=line)
+        yield line, document
+        line += text.count("\n", start, at)
 
 
 _Reader = Callable[[Mapping[str, Any], dict[str, str]], Iterator[PositionReport]]
@@ -166,6 +201,15 @@ def _of_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Pos
         )  # fmt: skip
 
 
+def _of_path(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+    """Give the points of a flight that OpenSky tells, which have no speeds."""
+    name = str(one["icao24"])
+    if one.get("callsign"):
+        callsigns[name] = str(one["callsign"]).strip()
+    for time_s, lat, lon, barometric, *_ in one["path"]:
+        yield PositionReport(name, time_s, lat, lon, None, barometric)
+
+
 def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
     """Give OpenSky's state vectors, at the instants of their positions."""
     for state in one["states"] or ():
@@ -183,6 +227,7 @@ _JSON: tuple[tuple[frozenset[str], str, str, _Reader], ...] = (
     (frozenset({"now", "ac"}), "aircraft of ADS-B Exchange's interface", _FEET, _of_interface),
     (frozenset({"icao", "timestamp", "trace"}), "a trace of readsb", _FEET, _of_trace),
     (frozenset({"time", "states"}), "OpenSky's states", "m and m/s", _of_states),
+    (frozenset({"icao24", "path"}), "a track of OpenSky", "m", _of_path),
 )
 
 
@@ -193,7 +238,7 @@ def _of_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Repor
     del data
     days: dict[str, float | None] = {}
     for number, line in lines:
-        if not line.startswith("MSG"):
+        if not line.startswith(("MSG", "MLAT")):
             continue
         cells = line.split(",")
         if len(cells) < 17 or not (name := cells[4].strip()):
@@ -214,6 +259,8 @@ def _of_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Repor
             continue
         at, move = moves.get(name, (-math.inf, ()))
         recent = move if abs(time_s - at) <= _LASTS_S else (None,) * 3
+        if len(cells) > 21 and cells[21].strip() in ("-1", "1"):  # on the ground
+            alt = None
         yield number, PositionReport(name, time_s, lat, lon, None, _times(alt, FOOT_M), *recent)
 
 

@@ -80,15 +80,10 @@ def recording_of(
     table.notes.warnings += log.warnings
     named = [name for name, callsign in log.callsigns.items() if callsign == ownship]
     own = named[0] if len(named) == 1 else ownship
-    recording = table.recording(
+    return table.recording(
         own, lambda c: {**c, **enu_velocity(c)},
         kind=log.kind, units=log.units, callsigns=log.callsigns,
     )  # fmt: skip
-    others = table.count_with_second("alt")
-    recording.height = f"{kinds[0 if others is not None else 1]} altitude"
-    if others:
-        recording.height += f", of {others} aircraft {kinds[1]}"
-    return recording
 
 
 def _number(value: Any) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -102,6 +103,7 @@ def enu_velocity(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
     return {}
 
 
+_DAY_S, _NIGHT_S = 86400.0, 7200.0
 #: A clock that counts from 1970 is beyond these numbers in ns, µs and ms, and in s never.
 _EPOCHS = ((1e17, "ns"), (1e14, "µs"), (1e11, "ms"))
 
@@ -129,7 +131,11 @@ def in_epoch_units(column: SampleColumn, cell: str, header: str, notes: list[str
 
 
 def time_parser(column: SampleColumn) -> Callable[[str], float]:
-    """Make a function that reads a number in the column's unit, an ISO 8601 instant or a clock."""
+    """Make a function that reads a number in the column's unit, an ISO 8601 instant or a clock.
+
+    Clocks that go on soon after midnight are of the next day.
+    """
+    last = 0.0
 
     def parse(cell: str) -> float:
         try:
@@ -138,7 +144,13 @@ def time_parser(column: SampleColumn) -> Callable[[str], float]:
             return float(cell) * column.factor
         except ValueError:
             if clock := re.fullmatch(r"(\d{1,2}):(\d\d):(\d\d(?:\.\d*)?)Z?", cell):
-                return 3600.0 * int(clock[1]) + 60.0 * int(clock[2]) + float(clock[3])
+                nonlocal last
+                now = 3600.0 * int(clock[1]) + 60.0 * int(clock[2]) + float(clock[3])
+                day = min(round((last - now) / _DAY_S), math.floor(last / _DAY_S))
+                if now < _NIGHT_S and last % _DAY_S > _DAY_S - _NIGHT_S:
+                    day = math.floor(last / _DAY_S) + 1
+                last = now + _DAY_S * max(day, 0)
+                return last
             if "-" not in cell[1:] and "/" not in cell:
                 raise
             instant = datetime.fromisoformat(cell.replace("/", "-").removesuffix(" UTC"))

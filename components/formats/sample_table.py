@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from array import array
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
@@ -32,6 +33,11 @@ _LONGEST_SILENCE_S = 86400.0
 _FAR_APART_M = 1000 * FOOT_M
 # Samples closer than this are one instant, written twice.
 _SHORTEST_STEP_S = 1e-6
+#: At most one of so many samples may be at the instant of another, or lack an optional number that
+#: the nearest sample has within so many seconds: more is no slip of a recorder.
+_ONE_IN, _NEAR_S = 10, 5.0
+#: What a row lacks that is left out; all other needed columns are its position.
+_LACKS = {"time": "time", "alt": "height"}
 
 Converter = Callable[[dict[str, FloatArray]], dict[str, FloatArray]]
 
@@ -47,10 +53,11 @@ class _Rows:
 class SampleTable:
     """Collects samples row by row and turns them into trajectories.
 
-    A bad cell of an `optional` quantity is no error: the aircraft goes without the whole column,
-    and a note says so. With `gaps`, neither is a row without a time or a position: it is left out
-    and counted; an aircraft that has no number at all in one column takes those of the column that
-    `instead` names for it; and rows of an aircraft that say the same of an instant are one sample.
+    A bad cell of an `optional` quantity is no error: a few take that of the nearest sample, else
+    the aircraft goes without the whole column, and a note says so. With `gaps`, neither is a row
+    without a time or a position: it is left out and counted; an aircraft that has no number at all
+    in one column takes those of the column that `instead` names for it; and rows of an aircraft
+    that say the same of an instant are one sample, as are a few that do not: the last one counts.
     With `shared` names several aircraft may have one (`rename_duplicates`). Where a position
     `repeats` until the next one comes, its height need not be the same. That an aircraft has none
     of a `seldom` column is not worth a word. `parse_time` reads a time cell where a plain number
@@ -152,14 +159,20 @@ class SampleTable:
             return math.nan
         return self._number(line, quantity, self._columns[quantity], cell)
 
-    def count_with_second(self, key: str) -> int | None:
-        """Return how many aircraft have the second column of two; None for all of them."""
-        whom = len(self._second.get(key, []))
-        return None if whom and whom >= self._kept else whom
+    def _which(self, key: str) -> str:
+        """Return the column that a quantity is of, or the two."""
+        first, second = (self._columns.get(one) for one in (key, self._instead.get(key, "")))
+        whom = len(self._second.get(key, ()))
+        if first is None or second is None or not whom:
+            return "" if first is None else first.header
+        if whom == self._kept:
+            return second.header
+        return f"{first.header}, of {whom} aircraft {second.header}"
 
     def recording(self, ownship: str | None, to_geodetic: Converter, **said: Any) -> Recording:
         """Check each aircraft's samples and return them; `said` is what `Recording` says of it."""
         samples = {name: to_geodetic(one) for name, one in self.samples(ownship).items()}
+        said = {"height": self._which("alt"), **said}
         return Recording(self._problems, samples, self.notes, **said)
 
     def finish(self, ownship: str | None, to_geodetic: Converter) -> TrafficFile:
@@ -173,7 +186,11 @@ class SampleTable:
             kept = rename_duplicates(kept, self.notes)
         names = list(kept)
         if not names:
-            self._problems.fail("there are no samples: at least two aircraft are needed")
+            lacking = self._lacking(" or ")
+            of = f": all {self._kind_of_rows} have {lacking}" if lacking else " in it"
+            self._problems.fail(
+                f"there are no samples{of}; time, latitude, longitude and height are needed"
+            )
         if len(names) < self._least:
             self._problems.add(
                 f"there is one aircraft only, {shorten(names[0])!r}: an ownship and at least "
@@ -194,6 +211,7 @@ class SampleTable:
     def _without_gaps(self) -> dict[str, tuple[IntArray, dict[str, FloatArray]]]:
         """Return the lines and columns of each aircraft; rows and columns with gaps are gone."""
         kept = {}
+        self._lacks: dict[str, int] = {}
         left_out, absent = 0, 0
         for name, rows in self._aircraft.items():
             lines = np.asarray(rows.lines)
@@ -203,7 +221,9 @@ class SampleTable:
                 columns[key] = self._first_or_second(name, key, columns[key], columns.pop(other))
             there = np.ones(len(lines), dtype=bool)
             for key in columns.keys() - self._optional:
-                there &= ~np.isnan(columns[key])
+                if (lacks := np.isnan(columns[key])).any():
+                    self._lacks[_LACKS.get(key, "position")] = 1
+                    there &= ~lacks
             left_out += int(np.count_nonzero(~there))
             if not there.all():
                 lines = lines[there]
@@ -216,21 +236,34 @@ class SampleTable:
                     if missing == len(lines) and key in self._seldom:
                         del columns[key]
                         continue
+                    filled = _filled(columns["time"], columns[key])
                     self.notes.note_aircraft(
                         name, f"gaps in {self._columns[key].header}",
                         f"column {self._columns[key].header} has no number in {missing} of its "
-                        f"{len(columns[key])} samples and is ignored",
-                        harmless=missing == len(columns[key]),
+                        f"{len(columns[key])} samples and is ignored" if filled is None else
+                        f"column {self._columns[key].header} has no number in {missing} of its "
+                        f"{len(columns[key])} samples: that of the nearest one is taken",
+                        harmless=filled is not None or missing == len(columns[key]),
                     )  # fmt: skip
                     del columns[key]
+                    if filled is not None:
+                        columns[key] = filled
             kept[name] = lines, columns
         self._kept = len(kept)
+        self._second = {
+            key: [name for name in names if name in kept] for key, names in self._second.items()
+        }
         self._note_second_columns()
         if left_out:
             of = self._kind_of_rows[:-1] + " was" if left_out == 1 else f"{self._kind_of_rows} were"
-            what = f"{left_out} {of} left out that had no time or no position"
+            what = f"{left_out} {of} left out that had {self._lacking(' or ')}"
             self.notes.warnings.append(what + (f", {absent} aircraft wholly" if absent else ""))
         return kept
+
+    def _lacking(self, between: str) -> str:
+        """Return what rows lacked that were left out."""
+        kinds = ("time", "position", "height")
+        return between.join(f"no {kind}" for kind in kinds if kind in self._lacks)
 
     def _first_or_second(
         self, name: str, key: str, first: FloatArray, second: FloatArray
@@ -250,7 +283,7 @@ class SampleTable:
         for key, other in self._instead.items():
             first, second = self._columns[key].header, self._columns[other].header
             if whom := self._second.get(key, []):
-                if len(whom) == len(self._aircraft):
+                if len(whom) == self._kept:
                     self.notes.harmless.append(f"{second} is read: there is no {first}")
                 else:
                     more = f" (and {len(whom) - 1} more aircraft)" if len(whom) > 1 else ""
@@ -277,9 +310,11 @@ class SampleTable:
             shown = shorten(cell, MOST_OF_A_CELL)
             hint = "; use a decimal point" if cell.replace(",", ".", 1) != cell else ""
             what = f"{shown!r} is not a number" if cell else "the cell is empty"
-            self._problems.add(
-                f"{what}: a finite number is needed{hint}", line=line, column=column.header
-            )
+            needed = f"a finite number is needed{hint}"
+            if quantity == "time" and self._parse_time is not None and re.search(r"\d[./:-]", cell):
+                what = f"{shown!r} is no time"
+                needed = "it must be seconds, or as 2024-06-01T12:00:00Z"
+            self._problems.add(f"{what}: {needed}", line=line, column=column.header)
             return None
         if not math.isfinite(value):
             self._problems.add(
@@ -325,8 +360,15 @@ class SampleTable:
             once = np.concatenate([[True], ~again])
             lines, columns = lines[once], {key: values[once] for key, values in columns.items()}
         times, header = columns["time"], self._columns["time"].header
-        for i in np.flatnonzero(np.diff(times) < _SHORTEST_STEP_S):
-            what = f"{name} already has a sample at {times[i]:.15g} s, in line {lines[i]}: "
+        at_once = np.diff(times) < _SHORTEST_STEP_S
+        if self._gaps and 0 < (count := int(np.count_nonzero(at_once))) <= len(times) // _ONE_IN:
+            said = f"several samples at one instant, {count} times: the last one counts"
+            self.notes.note_aircraft(name, "at once", said)
+            last = np.append(~at_once, True)
+            return {key: values[last] for key, values in columns.items()}
+        for i in np.flatnonzero(at_once):
+            of = f"{self._problems.of} {lines[i]}"
+            what = f"{name} already has a sample at {times[i]:.15g} s, in {of}: "
             if times[i] == times[i + 1]:
                 what += "an aircraft may have only one at a time"
             else:
@@ -346,12 +388,32 @@ class SampleTable:
         times, lines = times[order], lines[order]
         for i in np.flatnonzero(np.diff(times) > _LONGEST_SILENCE_S):
             self._problems.add(
-                f"the time is {times[i + 1]:.15g} s, and the one before it, in line {lines[i]}, is "
-                f"{times[i]:.15g} s: the file may not be without a sample for more than "
-                f"{_LONGEST_SILENCE_S:g} s",
+                f"the time is {times[i + 1]:.15g} s, and the one before it, in "
+                f"{self._problems.of} {lines[i]}, is {times[i]:.15g} s: the file may not be "
+                f"without a sample for more than {_LONGEST_SILENCE_S:g} s (flights of several days "
+                "need a file each)",
                 line=int(lines[i + 1]),
                 column=self._columns["time"].header,
             )
+
+
+def _filled(times: FloatArray, values: FloatArray) -> FloatArray | None:
+    """Return values with those of the nearest sample in a few gaps; None where they are more."""
+    order = np.argsort(times, kind="stable")
+    known = order[~np.isnan(values[order])]
+    gaps = np.flatnonzero(np.isnan(values))
+    if len(gaps) > len(values) // _ONE_IN:
+        return None
+    after = np.searchsorted(times[known], times[gaps])
+    before, after = known[np.maximum(after - 1, 0)], known[np.minimum(after, len(known) - 1)]
+    is_before = times[gaps] - times[before] <= times[after] - times[gaps]
+    is_before = (is_before & (times[before] <= times[gaps])) | (times[after] < times[gaps])
+    nearest = np.where(is_before, before, after)
+    if np.any(np.abs(times[nearest] - times[gaps]) > _NEAR_S):
+        return None
+    filled = values.copy()
+    filled[gaps] = values[nearest]
+    return filled
 
 
 def _limits(quantity: str) -> tuple[float, float, str]:

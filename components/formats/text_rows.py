@@ -76,6 +76,8 @@ TIME_S = {
     "second": 1.0,
     "seconds": 1.0,
     "ms": 1e-3,
+    "millisecond": 1e-3,
+    "milliseconds": 1e-3,
     "us": 1e-6,
     "µs": 1e-6,
     "ns": 1e-9,

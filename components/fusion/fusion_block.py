@@ -104,6 +104,7 @@ class Fusion(Component):
                 latest_s=largest_delay_s(one) + waits_s,
                 jitter_s=one.jitter_s + one.offer.jitter_s + waits_s,
                 unforeseen=one.unforeseen or one.offer.unforeseen,
+                platform=one.platform,
             )
             if isinstance(one.offer, SensorOffer)
             else one.offer

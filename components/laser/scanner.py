@@ -28,6 +28,7 @@ from components.sensor.look import Cells, Look
 from components.sensor.marks import LASER
 from components.sensor.parameters import RangeErrorParameters, SensorParameters
 from components.sensor.sensor import CUED_INPUTS
+from components.sensor.weather_cells import cells_warnings
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
@@ -210,6 +211,10 @@ class ScanningLaser(SweepingSensor):
         """Take what the scene's air does to a pulse, and refuse cues."""
         refuse_cues(self, "its pattern is fixed, with one threshold")
         self._extinction_per_m = self.built_one(EXTINCTION) or 0.0
+
+    def warnings(self) -> list[str]:
+        """Say that cells of weather have no effect."""
+        return [*super().warnings(), *cells_warnings(self)]
 
     def snr_and_shots(self, cells: Cells) -> tuple[FloatArray, FloatArray]:
         """Return each cell's amplitude over noise in one shot, and the mean shots of a scan."""

@@ -224,6 +224,8 @@ class Transform(Component):
         return RelativeTargets(
             tick=wake.ticks,
             state_tick=states.tick,
+            own_lat_deg=states.own_lat_deg,
+            own_lon_deg=states.own_lon_deg,
             own_alt_m=states.own_alt_m,
             roster=states.roster,
             columns=states.columns,

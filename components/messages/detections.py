@@ -179,6 +179,8 @@ class SensorOffer:
     told_errors : tuple of ToldError
         Errors whose deviations differ from detection to detection, as `told_by_target` has them.
         What carries them needs no `lasting` of the same.
+    platform : str
+        What carries it, to whom a fusion offers it.
     """
 
     measures_range: bool
@@ -199,6 +201,7 @@ class SensorOffer:
     promises: tuple[tuple[float, float], ...] = ()
     tells: bool = False
     told_errors: tuple[ToldError, ...] = ()
+    platform: str = ""
 
 
 #: A sensor that looks at least so often promises no time: it reports at every look, s.

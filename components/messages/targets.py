@@ -268,6 +268,8 @@ class RelativeTargets(Message):
         Target's heading minus bearing of the line of sight: 0 when it flies away from us.
     own_alt_m, alt_m : (rows,) and (rows, targets)
         Altitudes above the ellipsoid, for what changes with height.
+    own_lat_deg, own_lon_deg : (rows,), or None
+        Where the ownship truly is, for weather; None from a block that does not say.
     roster, columns, culled, present
         As in `TrafficStates`.
     believed : dict of (rows,), or None
@@ -305,6 +307,8 @@ class RelativeTargets(Message):
     revisit: KnownFlights | None = per_row(default=None, kw_only=True)
     state_tick: IntArray | None = per_row(default=None, kw_only=True)
     hidden: BoolArray | None = per_row(default=None, kw_only=True)
+    own_lat_deg: FloatArray | None = per_row(default=None, kw_only=True)
+    own_lon_deg: FloatArray | None = per_row(default=None, kw_only=True)
 
     joins_static = frozenset({"columns"})
 

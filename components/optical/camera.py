@@ -31,7 +31,7 @@ from components.optical.detector import (
 )
 from components.optical.infrared_area import AREA
 from components.optical.signature import SIGNATURE, DynamicSignature, pixels_of_cells
-from components.optical.weather_effects import DARKNESS, Visibility
+from components.optical.weather_effects import DARKNESS, ObscuringCells, Visibility
 from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
 from components.sensor.look import Cells, CellValues, Look, values_of
 from components.sensor.parameters import GlintParameters, SensorParameters
@@ -188,6 +188,7 @@ class Camera(Sensor):
     effects: ClassVar[tuple[Effect, ...]] = (
         DynamicSignature(),
         Visibility(),
+        ObscuringCells(),
         FrameFalseAlarms(),
         CUED_LOOKS,
     )

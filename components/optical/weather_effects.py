@@ -1,5 +1,6 @@
 """The contrast that haze, fog and rain take from a camera."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from components.atmosphere.infrared import (
     mid_wave_transmission,
     precipitable_water_mm,
 )
+from components.atmosphere.slant_path import share_between
 from components.atmosphere.visibility import (
     KOSCHMIEDER,
     combined_visibility_m,
@@ -21,6 +23,12 @@ from components.atmosphere.visibility import (
 from components.environment.tables import Weather
 from components.optical.contrast import CONTRAST, visibility_transmission
 from components.sensor.look import Cells, CellValues
+from components.sensor.weather_cells import (
+    cells_verdict,
+    heights_within,
+    on_the_way,
+    weather_cells,
+)
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
@@ -94,6 +102,51 @@ class BandExtinction(Effect[CellValues]):
                 return np.asarray(clear * np.exp(-extinction * cells.range_m))
 
         return factor
+
+
+class ObscuringCells(Effect[CellValues]):
+    """What rain and fog of the scene's moving cells take, by what of a line of sight lies in each.
+
+    Rain below ``rain_top_m``, fog between its edges; in an infrared band as `BandExtinction` does.
+    """
+
+    name = "weather cells"
+    acts_on = CONTRAST
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask whether a cell comes near."""
+        return cells_verdict(block)
+
+    def build(self, block: Any) -> CellValues:
+        """Return the factor on every cell's contrast."""
+        if not weather_cells(block):
+            return lambda cells: np.ones(len(cells))
+        weather = block.context.sections["weather"]
+
+        def factor(cells: Cells) -> FloatArray:
+            depth = np.zeros(len(cells))
+            for one, within in on_the_way(block, cells):
+                ends_m = heights_within(cells, within)
+                low, high = np.minimum(*ends_m), np.maximum(*ends_m)
+                rain = share_between(low, high, -math.inf, weather.rain_top_m)
+                fog = share_between(low, high, weather.fog_base_m, weather.fog_top_m)
+                per_m = rain * float(rain_extinction_per_m(one.rain_rate_mm_h))
+                per_m += fog * _fog_per_m(infrared_band_of(block), one.fog_water_g_m3)
+                depth += per_m * cells.range_m * (within.leaves - within.enters)
+            with np.errstate(under="ignore"):
+                return np.exp(-depth)
+
+        return factor
+
+
+def _fog_per_m(band: str | None, water_g_m3: float) -> float:
+    """Return what fog takes of visible light, or of an infrared band, 1/m."""
+    visibility_m = float(fog_visibility_m(water_g_m3))
+    if math.isinf(visibility_m):
+        return 0.0
+    if band is None:
+        return KOSCHMIEDER / visibility_m
+    return band_extinction_per_m(band, visibility_m)
 
 
 DARKNESS = Hook("darkness", bool, "whether it is too dark to see anything")

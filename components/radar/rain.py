@@ -29,6 +29,7 @@ from components.radar.ground_clutter import (
 )
 from components.radar.resolution import CELL_SIZES, cell_size
 from components.sensor.look import Cells
+from components.sensor.weather_cells import cells_verdict, on_the_way, weather_cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 
@@ -157,6 +158,8 @@ def _normal_share_below(deviations: FloatArray) -> FloatArray:
 class RainClutter(Effect[Echo]):
     """Echo of rain in the resolution cell of each target, as far as it rains there.
 
+    In a cell of ``[weather] cells`` it rains as it does there and everywhere together.
+
     The beam points at the target. Drops scatter after Rayleigh, by the rain rate (Z = 200 R^1.6);
     the air and the rain on the way take from their echo what they take from the target's. It
     fluctuates like noise from pulse to pulse. It moves with the wind and falls.
@@ -169,9 +172,13 @@ class RainClutter(Effect[Echo]):
         """Ask ``[weather] rain_rate_mm_h``, and for a carrier and a cell."""
         rate = _rain_rate(block)
         because = f"[weather] rain_rate_mm_h is {rate:g}"
-        if rate and (why := no_rain_echo(block)):
+        somewhere = Verdict(False, "")
+        if any(one.rain_rate_mm_h for one in weather_cells(block)):
+            somewhere = cells_verdict(block)
+            because = because if rate else somewhere.because
+        if (rate or somewhere.simulated) and (why := no_rain_echo(block)):
             return Verdict(False, why)
-        return Verdict(rate > 0, because)
+        return Verdict(rate > 0 or somewhere.simulated, because)
 
     def build(self, block: Any) -> Echo:
         """Return what gives the rain's RCS, 0 without rain."""
@@ -191,15 +198,26 @@ class RainEcho(Echo):
     def __init__(self, block: Any) -> None:
         super().__init__(block)
         self.weather = block.context.sections["weather"]
-        self.per_m = rain_reflectivity_of(block)
+        self.per_m = float(rain_reflectivity_of(block, _rain_rate(block)))
         self.lowest_m = -math.inf if self.terrain is None else self.terrain.height_m
         towards = math.radians(self.weather.wind_from_deg) + math.pi
         wind = self.weather.wind_mps
         fall_m_s = float(fall_speed_m_s(self.weather.rain_rate_mm_h))
         self.moves_m_s = wind * math.cos(towards), wind * math.sin(towards), fall_m_s
+        self._somewhere = any(one.rain_rate_mm_h for one in weather_cells(block))
+
+    def rate_mm_h(self, cells: Cells) -> FloatArray:
+        """Return how strongly it rains at each target."""
+        rate = np.full(len(cells), float(self.weather.rain_rate_mm_h))
+        for one, within in on_the_way(self.block, cells):
+            rate += np.where(within.leaves >= 1.0, one.rain_rate_mm_h, 0.0)
+        return rate
 
     def __call__(self, cells: Any) -> FloatArray:
         """Return the RCS of the rain in each cell's resolution cell, m²."""
+        per_m: float | FloatArray = self.per_m
+        if self._somewhere:
+            per_m = rain_reflectivity_of(self.block, self.rate_mm_h(cells))
         volume_m3 = rain_volume_m3(
             cells.range_m,
             cells.elevation_rad,
@@ -210,7 +228,7 @@ class RainEcho(Echo):
             lowest_m=self.lowest_m,
             highest_m=self.weather.rain_top_m,
         )
-        return np.asarray(self.per_m * volume_m3)
+        return np.asarray(per_m * volume_m3)
 
     def range_rates(
         self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
@@ -222,7 +240,10 @@ class RainEcho(Echo):
             level * np.sin(cells.azimuth_rad),
             -np.sin(cells.elevation_rad),
         )
-        past = [rain - own for rain, own in zip(self.moves_m_s, own_m_s, strict=True)]
+        *wind, fall = self.moves_m_s
+        if self._somewhere:
+            fall = fall_speed_m_s(self.rate_mm_h(cells))
+        past = [rain - own for rain, own in zip((*wind, fall), own_m_s, strict=True)]
         mean = sum(part * along for part, along in zip(past, sight, strict=True))
         speed_m_s = np.sqrt(sum(part * part for part in past))
         # Rounding alone may put a rate beyond the speed that it is part of.
@@ -269,7 +290,7 @@ class SidelobeEcho(Echo):
         self.weather = block.context.sections["weather"]
         self.per_m = 0.0
         if self.weather.rain_rate_mm_h and block.wavelength_m is not None:
-            self.per_m = rain_reflectivity_of(block)
+            self.per_m = float(rain_reflectivity_of(block, _rain_rate(block)))
 
     def __call__(self, cells: Any) -> FloatArray:
         """Return the RCS of ground and rain at each cell's range, m², below the sidelobes."""
@@ -307,9 +328,9 @@ def no_rain_echo(block: Any) -> str:
     return ""
 
 
-def rain_reflectivity_of(block: Any) -> float:
-    """Return the RCS of a volume of the scene's rain as a radar receives it, 1/m."""
-    per_m = float(rain_reflectivity_per_m(_rain_rate(block), block.wavelength_m))
+def rain_reflectivity_of(block: Any, rate_mm_h: ArrayLike) -> Any:
+    """Return the RCS of a volume of rain as a radar receives it, 1/m."""
+    per_m = rain_reflectivity_per_m(rate_mm_h, block.wavelength_m)
     if block.p.polarisation == "circular":
         per_m *= 10.0 ** (-0.1 * block.p.rain_rejection_db)
     return per_m

@@ -16,6 +16,12 @@ from components.atmosphere.slant_path import (
 from components.environment.tables import Weather
 from components.radar.rain import HIGHEST_RAYLEIGH_HZ, no_rain_echo
 from components.sensor.look import Cells, CellValues
+from components.sensor.weather_cells import (
+    cells_verdict,
+    heights_within,
+    on_the_way,
+    weather_cells,
+)
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
@@ -148,7 +154,8 @@ def weather_without_carrier(block: Any) -> list[str]:
     weather = block.context.sections.get("weather")
     if weather is None or block.wavelength_m is not None or not block.p.enabled:
         return []
-    there = [key for key in ("gas", "rain_rate_mm_h", "fog_water_g_m3") if getattr(weather, key)]
+    keys = ("gas", "rain_rate_mm_h", "fog_water_g_m3", "cells")
+    there = [key for key in keys if getattr(weather, key)]
     if not there:
         return []
     return [
@@ -171,7 +178,8 @@ class Gas(Attenuation):
 def rain_warnings(block: Any) -> list[str]:
     """Say where rain has no echo, or where its echo is taken for more than it is."""
     weather = block.context.sections.get("weather")
-    if weather is None or not weather.rain_rate_mm_h or not block.p.enabled:
+    rains = weather is not None and any(c.rain_rate_mm_h for c in (weather, *weather.cells))
+    if not rains or not block.p.enabled:
         return []
     if block.wavelength_m is None:
         return []  # said of all weather
@@ -251,4 +259,39 @@ class Fog(Attenuation):
         }
 
 
-WEATHER_EFFECTS = (Gas(), Rain(), Fog())
+class CellsOfWeather(Effect[CellValues]):
+    """Rain and fog of the scene's moving cells, by what of a line of sight lies in each."""
+
+    name = "weather cells"
+    acts_on = SNR
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask whether a cell comes near, and whether the radar's carrier is known."""
+        if weather_cells(block) and block.wavelength_m is None:
+            return Verdict(False, _NO_CARRIER)
+        return cells_verdict(block)
+
+    def build(self, block: Any) -> CellValues:
+        """Return the factor on every cell's SNR."""
+        if not weather_cells(block) or block.wavelength_m is None:
+            return lambda cells: np.ones(len(cells))
+        weather, tables = block.context.sections["weather"], []
+        for one in weather_cells(block):
+            of_cell = weather.model_copy(update=one.model_dump(include=_OF_CELL))
+            settings = {**Rain().settings(of_cell, block), **Fog().settings(of_cell, block)}
+            frequency_hz = SPEED_OF_LIGHT_M_S / block.wavelength_m
+            tables.append(attenuation_table(frequency_hz, gas=False, **settings))
+
+        def factor(cells: Cells) -> FloatArray:
+            loss_db = np.zeros(len(cells))
+            for (_, within), table in zip(on_the_way(block, cells), tables, strict=True):
+                length_m = cells.range_m * (within.leaves - within.enters)
+                heights_m = heights_within(cells, within)
+                loss_db += one_way_attenuation_db(length_m, *heights_m, table)
+            return two_way_transmission(loss_db)
+
+        return factor
+
+
+_OF_CELL = {"rain_rate_mm_h", "fog_water_g_m3"}
+WEATHER_EFFECTS = (Gas(), Rain(), Fog(), CellsOfWeather())

@@ -122,11 +122,16 @@ class CovarianceIntersection(Component):
     their own, in a frame of their own: that of the first track to come. What is known of a target
     is brought to the instant of the newest report, and combined without knowing how the trackers'
     errors hang together (`components.estimation.covariance_intersection`). A track without a range
-    adds its direction to one that has it.
+    adds its direction to one that has it, unless that may be of the platform itself, which another
+    one sees. Fused tracks are seen from where the trackers on board are, if there are any.
     """
 
     mark = FUSION
-    inputs = {"tracks": Input(StateTracks, "trigger", "What the trackers hold.", many=True)}
+    inputs = {
+        "tracks": Input(
+            StateTracks, "trigger", "What the trackers hold.", many=True, between_platforms=True
+        )
+    }
     outputs = {"tracks": Output(StateTracks, "One track of each target.")}
     Parameters = IntersectionParameters
     remembers = ("_records", "_newest", "_local", "_reported", "_tries")
@@ -137,7 +142,10 @@ class CovarianceIntersection(Component):
 
     def setup(self) -> None:
         """Start with no tracks, and learn which trackers send them."""
-        self.trackers = tuple(sorted(producer.block for producer in self.context.producers))
+        on = {producer.block: producer.platform for producer in self.context.producers}
+        self.trackers = tuple(sorted(on))
+        here = np.array([on[name] == self.context.platform for name in self.trackers])
+        self._on_board = here if here.any() else ~here
         offers = sensor_offers(self.context.producers)
         ranged = {n for n, o in offers.items() if isinstance(o, SensorOffer) and o.measures_range}
         self.sensors = tuple(sorted(offers, key=lambda name: (name not in ranged, name)))
@@ -146,6 +154,7 @@ class CovarianceIntersection(Component):
             ConstantVelocity(self.p.acceleration_intensity_m2_s3),
             math.radians(self.p.bearing_rate_deg_s),
             self.p.stay_factor,
+            None if self._on_board.all() else tuple(on[name] for name in self.trackers),
         )
         self._records = records_of(np.empty(0, dtype=np.int64))
         #: By tracker: of each replica, the newest instant that it reported of.
@@ -272,7 +281,7 @@ class CovarianceIntersection(Component):
         for index, rows in enumerate(reported_at):
             gone |= (local.tracker == index) & np.isin(local.replica, replica[np.isin(at, rows)])
         local = LocalTracks.concatenate([local.take(~gone), new])
-        records = with_newest(records, new)
+        records = with_newest(records, new, self._on_board)
         when = records.time_s[np.searchsorted(records.replica, local.replica)]
         now = np.isin(local.replica, replica)
         silent = now & (when - local.updated_s > self.p.drop_after_s)

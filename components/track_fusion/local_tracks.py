@@ -12,7 +12,7 @@ from components.geometry import unit_vector_unchecked
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks, full_covariance
 from dsa_des.arrays.keyed_table import KeyedTable
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: Tracks of one tracker in a run are fewer than this.
 _NUMBERS = 1 << 36
@@ -135,7 +135,8 @@ def records_of(replicas: IntArray) -> KeyedTable:
     """Return what is kept of each run beside its tracks, before the first of them.
 
     ``origin`` (3, n) of its frame is latitude, longitude and height in deg and m, ``time_s`` the
-    newest instant that any track spoke of, and ``own_m`` (3, n) where the ownship was then.
+    newest instant that any track spoke of, and ``own_m`` (3, n) where the ownship was at ``own_s``,
+    the newest instant that a tracker on board spoke of (``own_on_board``), or else any.
     """
     count = len(replicas)
     return KeyedTable(
@@ -144,15 +145,26 @@ def records_of(replicas: IntArray) -> KeyedTable:
         next_number=np.ones(count, dtype=np.int64),
         time_s=np.full(count, -np.inf),
         own_m=np.full((3, count), np.nan),
+        own_s=np.full(count, -np.inf),
+        own_on_board=np.zeros(count, dtype=bool),
     )
 
 
-def with_newest(records: KeyedTable, new: LocalTracks) -> KeyedTable:
-    """Return records that know the newest instant, and where the ownship is then."""
-    time_s, own_m = records.time_s.copy(), records.own_m.copy()
-    order = np.lexsort((-new.tracker, new.time_s))
-    of = np.searchsorted(records.replica, new.replica[order])
-    late = new.time_s[order] >= time_s[of]
-    time_s[of[late]] = new.time_s[order][late]
-    own_m[:, of[late]] = new.own_m[:, order][:, late]
-    return records.with_columns(time_s=time_s, own_m=own_m)
+def with_newest(records: KeyedTable, new: LocalTracks, on_board: BoolArray) -> KeyedTable:
+    """Return records that know the newest instant, and where the ownship is.
+
+    `on_board` says of each tracker whether it is.
+    """
+    time_s, own_m, own_s = (getattr(records, n).copy() for n in ("time_s", "own_m", "own_s"))
+    here = records.own_on_board.copy()
+    order = np.lexsort((-new.tracker, new.time_s, on_board[new.tracker]))
+    of, when = np.searchsorted(records.replica, new.replica[order]), new.time_s[order]
+    np.maximum.at(time_s, of, when)
+    mine = on_board[new.tracker[order]]
+    here[of[mine]] = True
+    counts = (mine | ~here[of]) & (
+        when >= np.where(records.own_on_board[of] == mine, own_s[of], -np.inf)
+    )
+    own_m[:, of[counts]] = new.own_m[:, order][:, counts]
+    own_s[of[counts]] = when[counts]
+    return records.with_columns(time_s=time_s, own_m=own_m, own_s=own_s, own_on_board=here)

@@ -31,6 +31,7 @@ class MatchRules:
     bearing_rate_rad_s: float
     # How many times as far as the gate a member may drift from its leader before it leaves
     stay_factor: float
+    platforms: tuple[str, ...] | None = None  # What carries each tracker; None where one does
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +85,27 @@ def gate_share(
         for i in range(2):
             spread[i, i] += angles.variance[i]
         result = distance_squared(cholesky(spread), angles.residual) / two
+        result[_may_be_oneself(rules, mine, theirs, x, p)] = np.inf
         where = np.concatenate([np.flatnonzero(one & ~swap), np.flatnonzero(swap)])
         share[where] = result
     if none.any():
         share[none] = _bearing_distances(rules, leader.take(none), other.take(none)) / two
     return share
+
+
+def _may_be_oneself(
+    rules: MatchRules, ranged: LocalTracks, seen: LocalTracks, x: FloatArray, p: FloatArray
+) -> BoolArray:
+    """Return which tracks with a range may be of whoever sees the others.
+
+    Of such a one each direction is likely. Who has it sees from elsewhere: nobody sees itself.
+    """
+    if rules.platforms is None:
+        return np.zeros(len(ranged), dtype=bool)
+    on = np.unique(rules.platforms, return_inverse=True)[1]
+    near = distance_squared(cholesky(p[:3, :3]), x[:3] - seen.own_m)
+    gate = gate_threshold(rules.gate_probability, 3)
+    return np.asarray((on[ranged.tracker] != on[seen.tracker]) & (near <= gate))
 
 
 def _bearing_distances(rules: MatchRules, one: LocalTracks, other: LocalTracks) -> FloatArray:

@@ -185,7 +185,14 @@ class TrafficSource(Component):
         """Return which platform each block steers; one that two steer is refused."""
         steering: dict[int, str] = {}
         for producer in self.context.producers:
-            other = steering.setdefault(self._index(producer.platform), producer.block)
+            index = self._index(producer.platform)
+            if index in self.unseen:
+                raise ValueError(
+                    f"{producer.block} is on {producer.platform!r}, which stands and is not "
+                    "steered: on the way from there to an aircraft a block must say that it is on "
+                    "that one (platform = ...)"
+                )
+            other = steering.setdefault(index, producer.block)
             if other != producer.block:
                 raise ValueError(
                     f"{other} and {producer.block} both steer {producer.platform!r}: one block "

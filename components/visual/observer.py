@@ -28,6 +28,7 @@ from components.sensor.parameters import (
     rising_elevations,
 )
 from components.sensor.sensor import Sensor
+from components.sensor.weather_cells import cells_warnings
 from components.visual.acquisition import (
     UNALERTED_PER_SR_S,
     acquisition_rate,
@@ -238,6 +239,10 @@ class Lookout(Sensor):
             farthest_m = farthest_shown_m(largest_m2, self._smallest_rad) * _MARGIN + _MARGIN_M
             nearer_m = min(self.reach.range_max_m, farthest_m)
             self.reach = replace(self.reach, range_max_m=nearer_m)
+
+    def warnings(self) -> list[str]:
+        """Say that cells of weather have no effect."""
+        return [*super().warnings(), *cells_warnings(self)]
 
     def request(self, port: str) -> Any:
         """Ask for the flights too: aircraft may be acquired between scans."""

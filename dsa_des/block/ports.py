@@ -28,8 +28,8 @@ class Input:
     many : bool
         Whether several writers may be connected; they are seen in the order of their names.
     between_platforms : bool
-        Whether writers may be on other platforms than the block: what they send speaks for itself,
-        and does not say what carries it.
+        Whether writers may be on other platforms than the block (`Component.platforms`): what they
+        send says by itself from where it is.
     """
 
     message: type[Message]

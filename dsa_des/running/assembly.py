@@ -178,12 +178,13 @@ class Assembly:
         """Decide which effects exist in each stretch and build them."""
         planned: dict[int, list[Planned]] = {}
         problems: list[Problem] = []
+        for component in (one for of in self.stretches for one in of.values()):
+            component.context.duration_s = self.duration_s  # a verdict may ask others about the run
         for number, components in enumerate(self.stretches):
             tolerance = self._scenes[number].tolerance
             for name, component in components.items():
                 if id(component) in planned:
                     continue
-                component.context.duration_s = self.duration_s
                 planned[id(component)] = []
                 with self._preparing(name, problems):
                     planned[id(component)] = build_effects(

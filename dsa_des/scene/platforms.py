@@ -10,19 +10,17 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
     """Return what carries each block, by name: what its table says, or what carries its feeders.
 
     `moved` is what some blocks move (`Component.platforms`); these are on none themselves. A block
-    that nothing but they feed is on the first of it, if its table says nothing. A `SceneError`
-    refuses a name that there is not, and a block that is fed from two platforms.
+    that nothing but they feed is on the first of it, if its table says nothing. What comes over
+    inputs between platforms (`Input.between_platforms`) says it where nothing else does. A
+    `SceneError` refuses a name that there is not, and a block that is fed from two platforms.
     """
     known = [name for names in moved.values() for name in names]
+    near = {name: _feeding(scene, name, between=False) for name in scene.blocks}
+    far = {name: _feeding(scene, name, between=True) for name in scene.blocks}
     carrying: dict[str, str] = {}
     problems: list[Problem] = []
     for name, block in scene.blocks.items():
-        feeding = [
-            wire.source
-            for wire in scene.wires
-            if wire.target == name and not block.cls.inputs[wire.input].between_platforms
-        ]
-        said = block.options.platform
+        said, feeding = block.options.platform, near[name] + far[name]
         if said is not None and (said not in known or name in moved):
             problems.append(_explain_no_platform(scene, name, known if name not in moved else None))
         elif said is not None:
@@ -33,21 +31,26 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
         raise SceneError(problems)
     left = sorted(scene.blocks.keys() - moved.keys() - carrying.keys())
     while left:  # down the chains, around loops too
-        fed = {name: _feeding(scene, name, carrying) for name in left}
-        found = {name: min(feeders) for name, feeders in fed.items() if feeders}
+        found = _found(left, near, carrying) or _found(
+            [name for name in left if moved.keys() >= set(near[name])], far, carrying
+        )
         # What no chain reaches is on the first of all.
         carrying |= found or dict.fromkeys(left, next(iter(known), ""))
         left = [name for name in left if name not in carrying]
     for name in sorted(carrying):
-        mine, feeders = carrying[name], _feeding(scene, name, carrying)
+        mine, feeders = carrying[name], _carried(near[name], carrying)
+        is_settled = bool(feeders) or scene.blocks[name].options.platform is not None
+        feeders = feeders if is_settled else _carried(far[name], carrying)
         for other in sorted(feeders.keys() - {mine}):
             by = f"{feeders[mine]} feeds it" if mine in feeders else "its key platform says"
-            how = "give each platform one of its own"
+            how = "a block looks from one place; give each platform one of its own"
             if mine not in feeders:
                 how += ", and say which at the first block of its chain"
+            if not is_settled:
+                how = f"which of them it is on, its table must say (platform = {mine!r})"
             message = (
                 f"is carried by {mine!r}, as {by}, and {feeders[other]} on {other!r} feeds it too: "
-                f"a block looks from one place; {how}"
+                f"{how}"
             )
             problems.append(scene.problem(f"blocks.{name}", message))
     if problems:
@@ -55,14 +58,30 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
     return carrying
 
 
-def _feeding(scene: Scene, name: str, carrying: Mapping[str, str]) -> dict[str, str]:
-    """Return what carries the blocks that feed one, with the first of these on each."""
-    found: dict[str, str] = {}
+def _feeding(scene: Scene, name: str, *, between: bool) -> list[str]:
+    """Return the blocks that feed one, over inputs between platforms or over the others."""
     inputs = scene.blocks[name].cls.inputs
-    for wire in scene.wires:
-        between = wire.target == name and inputs[wire.input].between_platforms
-        if wire.target == name and wire.source in carrying and not between:
-            found.setdefault(carrying[wire.source], wire.source)
+    return [
+        wire.source
+        for wire in scene.wires
+        if wire.target == name and inputs[wire.input].between_platforms == between
+    ]
+
+
+def _found(
+    names: Sequence[str], feeding: Mapping[str, Sequence[str]], carrying: Mapping[str, str]
+) -> dict[str, str]:
+    """Return what carries those of some blocks of which a feeder is known."""
+    carried = {name: _carried(feeding[name], carrying) for name in names}
+    return {name: min(feeders) for name, feeders in carried.items() if feeders}
+
+
+def _carried(sources: Sequence[str], carrying: Mapping[str, str]) -> dict[str, str]:
+    """Return what carries some blocks, with the first of them on each."""
+    found: dict[str, str] = {}
+    for source in sources:
+        if source in carrying:
+            found.setdefault(carrying[source], source)
     return found
 
 

@@ -119,7 +119,7 @@ def test_raw_tracks_of_it_name_every_variable_and_count_categories(
     assert len({r["C_1"] for r in rows}) == 2
     # Without --raw there are no flights of such a model, and that is said.
     done = call("sample", "--model", model, "--count", 2, "--duration-s", 2, "--out", out)
-    assert done.exit_code == 2 and "has no variable 'v'" in done.stderr
+    assert done.exit_code == 2 and "it is a correlated model, of two aircraft" in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -214,4 +214,31 @@ def test_the_model_that_cannot_be_flown_is_named(model: Path, tmp_path: Path) ->
         done = call("generate", "--model", pair[0], "--intruder-model", pair[1], "--count", 2,
                     "--out", out)  # fmt: skip
         assert done.exit_code == 2
-        assert f"error: {model}: the model has no variable 'v'" in done.stderr
+        assert f"error: {model}: it is a correlated model" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("balloon", "it is a model of balloons"),
+        ("terminal", "part '# labels_transition' is missing"),
+    ],
+)
+def test_models_that_are_not_flown_are_called_what_they_are(
+    name: str, said: str, tmp_path: Path
+) -> None:
+    parts = {
+        "labels_initial": '"L", "\\dot h"', "G_initial": "0 1\n0 0", "r_initial": "2 2",
+        "N_initial": "3 1 2 1 1 0", "labels_transition": '"L", "\\dot h(t)", "\\dot h(t+1)"',
+        "G_transition": "0 0 0\n0 0 1\n0 0 0", "r_transition": "2 2 2", "N_transition": "3 1 1 3",
+        "boundaries": "0 1200 3000\n-800 0 800", "resample_rates": "0 0.1",
+    }  # fmt: skip
+    if name == "terminal":
+        parts = {key: text for key, text in parts.items() if "transition" not in key}
+    path = tmp_path / f"{name}_v1.txt"
+    path.write_text("".join(f"# {key}\n{text}\n" for key, text in parts.items()), encoding="utf-8")
+    done = call("sample", "--model", path, "--count", 2, "--duration-s", 2, "--out",
+                tmp_path / "o.csv")  # fmt: skip
+    assert done.exit_code == 2 and f"{path}: " in done.stderr and said in done.stderr
+    checked = CliRunner().invoke(main, ["check", str(path)])
+    assert checked.exit_code == 2 and "is an encounter model: dsa-des enc" in checked.stderr

@@ -73,7 +73,7 @@ def test_an_aircraft_without_a_level_has_its_geometric_height(tmp_path):
     assert file.warnings == [
         "25/100/102: geometric altitude is read beside barometric altitude of others: it has no "
         "barometric altitude",
-        "2 records were left out that had no time or no position, 1 aircraft wholly",
+        "2 records were left out that had no height, 1 aircraft wholly",
     ]
     path.write_bytes(tracks((None, 39500), (None, 30000)))
     found, file = heights_ft(path)
@@ -204,3 +204,10 @@ def test_plots_of_a_turn_may_come_out_of_their_order(tmp_path):
     mixed = read_asterix_plots(path)
     assert mixed.range_m.tolist() == ordered.range_m.tolist()
     assert mixed.scan_s.tolist() == ordered.scan_s.tolist() == [0.0]
+
+
+def test_records_of_an_edition_that_is_not_read_are_called_that(tmp_path):
+    path = tmp_path / "old.ast"
+    path.write_bytes(track(1, 10.0, 43.0, 16.0, 30_000) + track(2, 10.0, 120.0, 16.0, 30_000))
+    with pytest.raises(TrafficFileError, match="record 2: category 062, a latitude of 120 degrees"):
+        read_asterix(path)

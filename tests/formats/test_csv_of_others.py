@@ -56,7 +56,7 @@ def test_rows_with_gaps_are_left_out_and_columns_with_gaps_are_not_used(tmp_path
         "a00002": [(0, 47.05, 8.0, 1050), (30, 47.036, 8.0, 1050)],
     }
     assert file.ownship.velocity_enu_mps is not None  # its one gap is in a row left out
-    assert file.warnings[0] == "3 rows were left out that had no time or no position"
+    assert file.warnings[0] == "3 rows were left out that had no position or no height"
     assert file.warnings[1] == (
         "a00002: column roll has no number in 1 of its 2 samples and is ignored"
     )
@@ -85,7 +85,7 @@ def test_an_aircraft_without_the_altitude_read_has_its_other_one(tmp_path):
     }  # fmt: skip
     assert file.warnings == [
         "b: baroaltitude is read beside geoaltitude of others: it has no geoaltitude",
-        "2 rows were left out that had no time or no position, 1 aircraft wholly",
+        "2 rows were left out that had no height, 1 aircraft wholly",
     ]
     assert "geoaltitude is read, baroaltitude differs by up to 50 m (164 ft, a)" in file.notes
 
@@ -93,7 +93,7 @@ def test_an_aircraft_without_the_altitude_read_has_its_other_one(tmp_path):
 def test_rows_on_the_ground_are_left_out(tmp_path):
     file = read(tmp_path, PLAIN + "20,a,47.01,8,ground\n")
     assert flights(file) == flights(read(tmp_path, PLAIN))
-    assert file.warnings == ["1 row was left out that had no time or no position"]
+    assert file.warnings == ["1 row was left out that had no height"]
 
 
 def test_what_stands_there_again_counts_once(tmp_path):
@@ -108,6 +108,25 @@ def test_what_stands_there_again_counts_once(tmp_path):
     assert "b: rows were not in the order of time and have been sorted" in file.notes
     with pytest.raises(TrafficFileError, match="a already has a sample at 10 s, in line 3"):
         read(tmp_path, PLAIN + "10,a,47.006,8,1000\n")
+
+
+def test_a_few_samples_at_one_instant_and_a_few_gaps_are_slips(tmp_path):
+    rows = [f"{k},a,{47 + 0.001 * k:g},8,1000,{10 * k}" for k in range(20)]
+    rows[7], rows[19] = rows[7][:-2], rows[19][:-3]
+    text = "\n".join(["time,id,lat,lon,alt,heading", *rows, "5,a,47.0052,8,1000,55"])
+    text += "\n0,b,47,9,1,0\n1,b,47,9,1,0\n"
+    file = read(tmp_path, text)
+    own = file.ownship
+    assert len(own.sample_times_s) == 20 and own.lat_deg[5] == 47.0052
+    assert "a: several samples at one instant, 1 times: the last one counts" in file.warnings
+    # Of two as near the earlier one.
+    yaw = own.at(own.sample_times_s).yaw_rad
+    assert np.degrees(yaw[[6, 7, 8, 18, 19]]) % 360 == pytest.approx([60, 60, 80, 180, 180])
+    filled = "a: column heading has no number in 2 of its 21 samples: that of the nearest one is"
+    assert any(note.startswith(filled) for note in file.notes)
+    many = text + "".join(f"{k},a,47.2,8,1000,0\n" for k in (3, 8))
+    with pytest.raises(TrafficFileError, match="3 problems"):
+        read(tmp_path, many)
 
 
 READSB = """\
@@ -258,7 +277,9 @@ def test_check_tells_what_was_left_out_and_run_json_keeps_it(tmp_path, monkeypat
     (tmp_path / "s.toml").write_text(scene + 'altitude = "barometric"\n')
     done = CliRunner().invoke(main, ["check", "s.toml"])
     assert done.exit_code == 0, done.stderr
-    assert "note: blocks.traffic: file t.csv: 2 rows were left out that had no time" in done.stderr
+    assert (
+        "note: blocks.traffic: file t.csv: 2 rows were left out that had no position" in done.stderr
+    )
     done = CliRunner().invoke(main, ["run", "s.toml", "--no-figures", "--out", "r"])
     assert done.exit_code == 0, done.stderr
     kept = json.loads((tmp_path / "r" / "run.json").read_text())["notes"]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import dsa_des
 from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
+from components.formats.recorded import known_kinds
 from components.formats.text_rows import TrafficFileError
 
 FOOT, KNOT = 0.3048, 1852 / 3600
@@ -21,6 +22,11 @@ def read(folder, content, name="log", **options):
     text = content if isinstance(content, str) else json.dumps(content)
     path.write_bytes(text.encode())
     return read_csv(path, **options)
+
+
+def record(folder, content):
+    (folder / "log").write_text(json.dumps(content))
+    return known_kinds.record(folder / "log")
 
 
 def snapshot(now, *aircraft):
@@ -57,9 +63,35 @@ def test_a_history_of_snapshots_is_read_in_feet_and_knots(tmp_path):
     assert up == pytest.approx([64 * FOOT / 60] * 3)
     # On the ground, its first report has no altitude.
     assert other.sample_times_s == pytest.approx([0.0, 10.1])
-    assert file.warnings[0].startswith("2 reports were left out that had no time or no position")
+    assert file.warnings[0].startswith("2 reports were left out that had no position or no height")
     assert "1 aircraft wholly" in file.warnings[0]
     assert "read as aircraft.json of readsb, ft and kt" in file.notes
+
+
+def test_histories_as_people_keep_them(tmp_path):
+    """In a list, over lines, and still being written."""
+    flown = [one.alt_m.tolist() for one in read(tmp_path, HISTORY).aircraft]
+    assert len(flown) == 2
+    pretty = "\n".join(json.dumps(one, indent=1) for one in HISTORY)
+    lines = "\n".join(json.dumps(one) for one in [*HISTORY, HISTORY[-1]])
+    for text, said in (
+        (pretty, []),
+        (lines[:-40], ["the last line, 5, is cut off and was left out"]),
+    ):
+        file = read(tmp_path, text)
+        assert [one.alt_m.tolist() for one in file.aircraft] == flown
+        assert [one for one in file.warnings if "cut off" in one] == said
+    with pytest.raises(TrafficFileError, match="line 2: is no JSON that can be read"):
+        read(tmp_path, lines.replace('"now": 1700000001', "now"))
+    with pytest.raises(TrafficFileError, match="there are no samples in it; time, latitude"):
+        read(tmp_path, [snapshot(1.0)])
+
+
+def test_a_track_that_opensky_tells(tmp_path):
+    path = [[1700000000 + 10 * k, 47.0, 8.0 + 0.01 * k, 900 + k, 90.0, False] for k in range(3)]
+    file = record(tmp_path, {"icao24": "4b1805", "callsign": "SWR1 ", "path": path})
+    assert file.height == "barometric altitude" and file.callsigns == {"4b1805": "SWR1"}
+    assert file.samples["4b1805"]["alt"].tolist() == [900, 901, 902]
 
 
 def test_one_snapshot_and_which_altitude(tmp_path):
@@ -145,8 +177,13 @@ def test_messages_of_basestation_are_joined(tmp_path):
     assert own.velocity_enu_mps[1] == pytest.approx([100 * KNOT] * 2)
     assert own.velocity_enu_mps[2] == pytest.approx([64 * FOOT / 60, 0.0])
     assert other.sample_times_s.tolist() == [0.5]
-    assert file.warnings == ["1 report was left out that had no time or no position"]
+    assert file.warnings == ["1 report was left out that had no height"]
     assert read(tmp_path, SBS, ownship="TEST1").ownship.name == "A1"
+    # Heard from within a line on, and by several receivers' times of arrival.
+    late = read(tmp_path, "24/06/01,0,0,0\n" + SBS.replace("MSG,", "MLAT,"))
+    assert [one.alt_m.tolist() for one in late.aircraft] == [
+        one.alt_m.tolist() for one in file.aircraft
+    ]
     with pytest.raises(TrafficFileError, match=r"line 3: 2024/13/01 23:59:59.000 is no date"):
         read(tmp_path, SBS.replace("2024/06/01,23:59:59.000,2024", "2024/13/01,23:59:59.000,2024"))
 

@@ -26,7 +26,8 @@ ANGLES = {
     **dict.fromkeys(("rad", "radian", "radians"), math.degrees(1.0)),
 }
 TIMES = {
-    **dict.fromkeys(("s", "sec", "second", "seconds"), 1), "ms": Fraction(1, 1000), "min": 60,
+    **dict.fromkeys(("s", "sec", "second", "seconds"), 1), "min": 60,
+    **dict.fromkeys(("ms", "millisecond", "milliseconds"), Fraction(1, 1000)),
     "h": HOUR, "hr": HOUR, "us": Fraction(1, 10**6), "µs": Fraction(1, 10**6),
     "ns": Fraction(1, 10**9),
 }  # fmt: skip

@@ -366,7 +366,7 @@ CSV_REFUSED = [
         "not a date",
         "own",
         CSV + "2020-13-01,a,45,-75,1\n",
-        "line 5, column time: '2020-13-01' is not",
+        "line 5, column time: '2020-13-01' is no time: it must be seconds, or as 2024-06-01T12",
     ),
     ("no name", "own", CSV + "2,,45,-75,1\n", "line 5: the aircraft has no name"),
     ("empty", "contract", "", "the file is empty"),

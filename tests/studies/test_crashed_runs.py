@@ -131,7 +131,7 @@ class _Process:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         module = "dsa_des.studies.attempts"
-        monkeypatch.setattr(f"{module}.joined", lambda name, parts: self.sum(name, parts))
+        monkeypatch.setattr(f"{module}.join_pieces", lambda name, parts: self.sum(name, parts))
         monkeypatch.setattr(
             f"{module}.crashed_run", lambda study, chunk, tries: Done(chunk.name, b"", 1, 1, 1)
         )

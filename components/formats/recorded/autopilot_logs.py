@@ -231,7 +231,8 @@ def tlog_log(problems: Problems, data: bytes, stem: str) -> Log:
     def each() -> Iterator[tuple[int, PositionReport]]:
         yield from _of_frames(problems, frames, stem, callsigns)
         if lost:
-            warnings.append(f"{len(lost)} frames are damaged and were left out")
+            what = "frame is" if len(lost) == 1 else "frames are"
+            warnings.append(f"{len(lost)} {what} damaged and left out")
 
     units = "1e-7 deg, mm and cm/s"
     return Log("a MAVLink log (tlog)", units, each(), callsigns, "frames", warnings)

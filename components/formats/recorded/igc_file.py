@@ -20,14 +20,15 @@ _DAY = timedelta(days=1)
 def is_igc(head: bytes) -> bool:
     """Tell whether some content begins as an IGC file does."""
     lines = head.lstrip(b"\xef\xbb\xbf\r\n ").splitlines()[:60]
-    first = lines[0][:1] if lines else b""
-    return first == b"A" and any(re.match(rb"HFDTE|B\d{13}[NS]", line) for line in lines[1:])
+    return any(re.match(rb"HFDTE[D\d]|B\d{13}[NS]\d{8}[EW][AV]", line) for line in lines)
 
 
 def igc_log(problems: Problems, data: bytes, stem: str) -> Log:
     """Return the flight of an IGC file: pressure altitude, GNSS altitude above the ellipsoid."""
     lines = lines_of(data, problems)
-    return Log("an IGC file", "m", _fixes(problems, lines, _name(lines) or stem), {}, "fixes")
+    warnings: list[str] = []
+    fixes = _fixes(problems, lines, _name(lines) or stem, warnings)
+    return Log("an IGC file", "m", fixes, {}, "fixes", warnings)
 
 
 def _name(lines: list[tuple[int, str]]) -> str:
@@ -39,9 +40,10 @@ def _name(lines: list[tuple[int, str]]) -> str:
 
 
 def _fixes(
-    problems: Problems, lines: list[tuple[int, str]], name: str
+    problems: Problems, lines: list[tuple[int, str]], name: str, warnings: list[str]
 ) -> Iterator[tuple[int, PositionReport]]:
     day: datetime | None = None
+    damaged: list[int] = []
     last_s = -1
     more: dict[str, slice] = {}
     pressed = any(one[1][25:30].strip("0") for one in lines if _FIX.match(one[1]))
@@ -60,7 +62,7 @@ def _fixes(
         elif line.startswith("B"):
             fix = _FIX.match(line)
             if fix is None:
-                problems.add("the fix is damaged: B record expected", line=number)
+                damaged.append(number)
                 continue
             if day is None:
                 problems.fail("there is no date (HFDTE) before its first fix", line=number)
@@ -79,6 +81,10 @@ def _fixes(
                     name, time_s, lat, lon, geometric, float(fix[11]) if pressed else None
                 ),
             )
+    if damaged:
+        what = "fix is" if len(damaged) == 1 else "fixes are"
+        said = f"{len(damaged)} {what} damaged and left out, the first in line {damaged[0]}"
+        warnings.append(said)
 
 
 def _digits(line: str, where: slice | None) -> str:

@@ -1,6 +1,6 @@
 """Read records in JSON, a list of them or one in each line, with the columns of a table."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from components.formats.csv_file import known_among, record_rows
@@ -23,7 +23,8 @@ def record_json(
     stem: str | None = None,
 ) -> Recording:
     """Return the aircraft of records, in a list or a line each, with the columns of a table."""
-    records = _records(problems, data)
+    warnings: list[str] = []
+    records = _records(problems, data, [])
     first = next(records, (1, None))[1]
     if first is None or known_among(map(str, first)) < _FEWEST:
         problems.fail(UNKNOWN_JSON)
@@ -31,7 +32,7 @@ def record_json(
     keys = list(headers)
 
     def rows() -> Iterator[tuple[int, list[str]]]:
-        for number, one in _records(problems, data):
+        for number, one in _records(problems, data, warnings):
             yield (
                 number,
                 [
@@ -40,18 +41,36 @@ def record_json(
                 ],
             )
 
-    return record_rows(
+    recording = record_rows(
         problems, headers, 1, rows(), ownship, altitude, stem, kind="records in JSON"
     )
+    recording.notes.warnings += warnings
+    return recording
 
 
 #: Of the columns of a table, as many must be there.
 _FEWEST = 3
 
 
-def _records(problems: Problems, data: bytes) -> Iterator[tuple[int, dict[str, Any]]]:
-    for number, document in json_documents(problems, data):
-        for one in document if isinstance(document, list) else [document]:
+def _records(
+    problems: Problems, data: bytes, warnings: list[str]
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    for number, document in json_documents(problems, data, warnings):
+        for one in _rows_of(document):
             if not isinstance(one, dict):
                 problems.fail(UNKNOWN_JSON, line=number)
             yield number, one
+
+
+def _rows_of(document: Any) -> Iterable[Any]:
+    """Return the records of a document: a list of them, one, or columns as pandas writes them."""
+    if isinstance(document, list):
+        return document
+    if isinstance(document, dict):
+        columns, rows = document.get("columns"), document.get("data")
+        if isinstance(columns, list) and isinstance(rows, list):
+            return (dict(zip(map(str, columns), row, strict=False)) for row in rows)
+        first = next(iter(document.values()), None)
+        if first and all(isinstance(one, dict) for one in document.values()):
+            return ({name: one.get(k) for name, one in document.items()} for k in first)
+    return [document]

@@ -51,6 +51,7 @@ _OTHERS = (
     (b"SQLite format 3", "is an SQLite database: save its table as CSV"),
     (b"\x89PNG", "is a picture"),
     (b"%PDF", "is a PDF"),
+    (b"# labels_initial", "is an encounter model: dsa-des encounters generate --model samples it"),
 )  # fmt: skip
 
 
@@ -131,13 +132,18 @@ def _unzip(problems: Problems, data: bytes) -> bytes:
         return data
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            inside = [one for one in archive.infolist() if not one.is_dir()]
+            inside = [
+                one for one in archive.infolist()
+                if not one.is_dir() and not one.filename.startswith("__MACOSX/")
+            ]  # fmt: skip
             first = [one for one in inside if one.filename.lower().endswith(".kml")] or inside
             if len(first) != 1 and first is inside:
                 problems.fail(f"is an archive of {len(inside)} files: give them one by one")
             if first[0].file_size > LARGEST_BYTES:
                 problems.fail(f"holds more than {LARGEST_BYTES / 2**20:,.0f} MB")
             return archive.read(first[0])
+    except TrafficFileError:
+        raise
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, EOFError) as error:
         problems.fail(f"the archive is damaged ({error})")
     except Exception as error:  # of the packing inside

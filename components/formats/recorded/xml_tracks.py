@@ -23,9 +23,9 @@ def xml_log(problems: Problems, data: bytes, stem: str) -> Log | None:
             "GPX tracks", "m", _points(problems, _of_gpx(problems, data, stem)), {}, "points"
         )
     if b"<kml" in head or (b"<document" in head and b"<placemark" in data.lower()):
-        return Log(
-            "KML tracks", "m", _points(problems, _of_kml(problems, data, stem)), {}, "points"
-        )
+        warnings: list[str] = []
+        points = _points(problems, _of_kml(problems, data, stem, warnings))
+        return Log("KML tracks", "m", points, {}, "points", warnings)
     return None
 
 
@@ -42,10 +42,10 @@ def _points(problems: Problems, points: Iterator[_Point]) -> Iterator[tuple[int,
         timed += time_s is not None
         yield number, PositionReport(name, time_s, _float(lat), _float(lon), geometric=_float(up))
     if not timed:
-        what = f"its {number} positions have" if number else "there are no positions that have"
+        what = f"its {number} positions have no times" if number else "there is no track in it"
         problems.fail(
-            f"{what} no times: a GPX with <time> at its points is needed, or a KML with gx:Track "
-            "or a TimeStamp at each point"
+            f"{what} (routes, waypoints and LineStrings have none): a GPX with <time> at its track "
+            "points is needed, or a KML with gx:Track or a TimeStamp at each point"
         )
 
 
@@ -106,7 +106,7 @@ def _of_gpx(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
             element.clear()
 
 
-def _of_kml(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
+def _of_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -> Iterator[_Point]:
     """Give the points of tracks, and those of placemarks with a time each."""
     names: dict[int, str] = {}
     inside: list[str] = []
@@ -127,6 +127,11 @@ def _of_kml(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
         inside.pop()
         if tag == "name":
             names[depth - 1] = _text(element)
+        elif tag == "altitudeMode" and _text(element) in _GROUND and not warnings:
+            if inside[-1:] in (["Track"], ["Point"]):
+                mode = _text(element)
+                said = f"heights are {_GROUND[mode]} (altitudeMode {mode})"
+                warnings.append(f"{said} and are read as above mean sea level")
         elif tag == "when" and inside[-1:] == ["Track"]:
             whens.append(_text(element))
         elif tag == "coord":
@@ -154,6 +159,10 @@ def _of_kml(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
 def _document(inside: list[str]) -> int:
     """Return at which depth the document is, whose name all that has none of its own goes by."""
     return inside.index("Document") + 1 if "Document" in inside else 0
+
+
+#: What heights are that are not above mean sea level, by their mode.
+_GROUND = {"relativeToGround": "above ground", "clampToGround": "not meant"}
 
 
 def _three(parts: list[str]) -> tuple[str, str, str]:

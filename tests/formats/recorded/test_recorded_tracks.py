@@ -71,8 +71,31 @@ def test_tracks_without_times_are_said(tmp_path):
         read(tmp_path, "a.gpx", timeless)
     line = b"<kml><Document><Placemark><LineString><coordinates>8,47,1 8,48,1</coordinates>"
     line += b"</LineString></Placemark></Document></kml>"
-    with pytest.raises(TrafficFileError, match="no positions that have no times"):
+    with pytest.raises(TrafficFileError, match="there is no track in it"):
         read(tmp_path, "a.kml", line)
+
+
+def test_heights_that_are_none_are_said(tmp_path):
+    flat = write.gpx({"one": FIXES}).replace(b"ele>", b"x>")
+    with pytest.raises(TrafficFileError, match="no samples: all points have no height; time"):
+        read(tmp_path, "a.gpx", flat)
+    some = write.gpx({"one": FIXES}).replace(b"<ele>1000.0</ele>", b"")
+    warnings = read(tmp_path, "a.gpx", some).notes.warnings
+    assert warnings == ["1 point was left out that had no height"]
+    low = write.kml({"one": FIXES}).replace(b">absolute<", b">relativeToGround<")
+    (warning,) = read(tmp_path, "a.kml", low).notes.warnings
+    assert warning.startswith("heights are above ground (altitudeMode relativeToGround)")
+
+
+def test_an_igc_file_as_programs_write_it_again(tmp_path):
+    """Without its first record; with a line cut short, and a second fix of one second."""
+    whole = write.igc([*FIXES[:4], *FIXES], list(range(1000, 1016)))
+    _, *lines = whole.decode().splitlines()
+    assert lines[2].startswith("B120000")
+    cut = "\n".join([*lines[:2], *lines[6:], "B1200", lines[-1][:-5] + "01111"]).encode()
+    found = read(tmp_path, "a.igc", cut)
+    assert_flown(found.samples["TST"], FIXES[:12], deg=2e-5, up_m=30.0)
+    assert found.notes.warnings[0] == "1 fix is damaged and left out, the first in line 15"
 
 
 def test_an_igc_file_has_two_heights_and_goes_over_midnight(tmp_path):
@@ -191,7 +214,7 @@ def test_damaged_frames_are_counted(tmp_path):
     data[at] ^= 255
     found = read(tmp_path, "a.tlog", bytes(data))
     assert len(found.samples["a"]["time"]) == len(FIXES) - 1
-    assert found.notes.warnings == ["1 frames are damaged and were left out"]
+    assert found.notes.warnings == ["1 frame is damaged and left out"]
 
 
 KINDS = {

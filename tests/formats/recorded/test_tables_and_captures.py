@@ -58,6 +58,38 @@ def read(tmp_path, name, data, **options):
     return record(path, **options)
 
 
+def test_columns_as_pandas_writes_them(tmp_path):
+    rows = history()
+    records = [dict(zip(rows, one, strict=True)) for one in zip(*rows.values(), strict=True)]
+    columns = {name: {str(k): v for k, v in enumerate(one)} for name, one in rows.items()}
+    split = {"columns": [*rows], "data": [list(one.values()) for one in records]}
+    plain = read(tmp_path, "a.json", json.dumps(records).encode()).samples
+    assert len(plain["4b1805"]["time"]) == 12
+    for document in (columns, split):
+        found = read(tmp_path, "a.json", json.dumps(document).encode()).samples
+        assert {name: one["lat"].tolist() for name, one in found.items()} == {
+            name: one["lat"].tolist() for name, one in plain.items()
+        }
+
+
+def test_a_drone_s_table_with_clocks_past_midnight_and_no_names(tmp_path):
+    lines = ["time(millisecond),name,latitude,longitude,height_above_takeoff(feet),"
+             "altitude_above_seaLevel(feet)"]  # fmt: skip
+    lines += [f"{100 * k},,47.0,{8 + 1e-5 * k:.5f},{k},{1000 + k}" for k in range(5)]
+    found = read(tmp_path, "mine.csv", "\n".join(lines).encode())
+    own = found.samples["mine"]
+    assert own["time"] == pytest.approx([0, 0.1, 0.2, 0.3, 0.4])
+    assert own["alt"] == pytest.approx([0.3048 * (1000 + k) for k in range(5)])
+    assert found.notes.warnings == ["5 rows have no name: called mine"]
+    late = ["time,id,lat,lon,alt"]
+    late += [f"{hour:02d}:{minute:02d}:00,{name},47,8,{k}" for name in "ab" for k, (hour, minute)
+             in enumerate([(20, 0), (23, 50), (0, 10), (3, 0)])]  # fmt: skip
+    found = read(tmp_path, "late.csv", "\n".join(late).encode())
+    for name in "ab":
+        hours = found.samples[name]["time"] / 3600
+        assert hours == pytest.approx([20, 23 + 5 / 6, 24 + 1 / 6, 27])
+
+
 def as_json(rows: dict[str, list], *, lines: bool) -> bytes:
     records = [dict(zip(rows, row, strict=True)) for row in zip(*rows.values(), strict=True)]
     return ("\n".join(map(json.dumps, records)) if lines else json.dumps(records)).encode()
