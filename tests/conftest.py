@@ -46,6 +46,23 @@ settings.load_profile("busy")
 ROOT = Path(__file__).parent.parent
 
 
+def hold_problems_to_sentences() -> None:
+    """Let no problem of a scene take a key or a value for its sentence, whoever reports it."""
+    from dsa_des.errors import Problem
+
+    made = Problem.__init__
+
+    def checked(self: Problem, source: str, key: str, message: str, *value: Any) -> None:
+        is_sentence = isinstance(message, str) and " " in message
+        assert is_sentence and isinstance(key, str), (source, key, message, *value)
+        made(self, source, key, message, *value)
+
+    Problem.__init__ = checked  # type: ignore[method-assign]
+
+
+hold_problems_to_sentences()
+
+
 @pytest.fixture(scope="session")
 def configs() -> Path:
     """The folder of the project's scenes."""

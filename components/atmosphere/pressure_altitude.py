@@ -46,15 +46,38 @@ def pressure_altitude_m(
     offset_k : array_like, K
         How much warmer the air is than the standard's at every height, above -100.
     """
-    offsets = finite("offset_k", offset_k)
-    refuse("offset_k", offsets, offsets <= -100.0, "be above -100")
-    heights = check_within("height_m", height_m, LOWEST_M, HIGHEST_M, "m")
-    shape, (height, qnh, offset) = broadcast_flat(
-        height_m=heights, qnh_hpa=positive("qnh_hpa", qnh_hpa), offset_k=offsets
-    )
+    shape, (height, qnh, offset) = _checked("height_m", height_m, qnh_hpa, offset_k)
     standard = (qnh == STANDARD_HPA) & (offset == 0.0)
     drop = _log_drop(height, offset) - np.log(qnh / STANDARD_HPA)
-    return unflatten(np.where(standard, height, _height_of(drop)), shape)
+    return unflatten(np.where(standard, height, _height_of(drop, 0.0)), shape)
+
+
+def height_of_pressure_altitude_m(
+    altitude_m: ArrayLike, *, qnh_hpa: ArrayLike = STANDARD_HPA, offset_k: ArrayLike = 0.0
+) -> Any:
+    """Return the height above sea level at which an altimeter reads an altitude, m.
+
+    The inverse of `pressure_altitude_m`, with its parameters.
+    """
+    shape, (altitude, qnh, offset) = _checked("altitude_m", altitude_m, qnh_hpa, offset_k)
+    standard = (qnh == STANDARD_HPA) & (offset == 0.0)
+    drop = _log_drop(altitude, 0.0) + np.log(qnh / STANDARD_HPA)
+    return unflatten(np.where(standard, altitude, _height_of(drop, offset)), shape)
+
+
+def scene_air(weather: Any) -> dict[str, float]:
+    """Return a scene's air as the parameters of these functions; empty for the standard's."""
+    if weather is None:
+        return {}
+    air = {"qnh_hpa": weather.qnh_hpa, "offset_k": weather.temperature_offset_c}
+    return {} if air == {"qnh_hpa": STANDARD_HPA, "offset_k": 0.0} else air
+
+
+def _checked(name: str, height_m: ArrayLike, qnh_hpa: ArrayLike, offset_k: ArrayLike) -> Any:
+    offset = finite("offset_k", offset_k)
+    refuse("offset_k", offset, offset <= -100.0, "be above -100")
+    height = check_within(name, height_m, LOWEST_M, HIGHEST_M, "m")
+    return broadcast_flat(height_m=height, qnh_hpa=positive("qnh_hpa", qnh_hpa), offset_k=offset)
 
 
 def _log_drop(height: Any, offset: Any) -> Any:
@@ -66,9 +89,10 @@ def _log_drop(height: Any, offset: Any) -> Any:
     return drop + _HYDROSTATIC_K_M * (height - below) / (_TROPOPAUSE_K + offset)
 
 
-def _height_of(drop: Any) -> Any:
-    """Return the heights at which the logarithm of pressure fell by so much in standard air."""
-    tropopause = _log_drop(_TROPOPAUSE_M, 0.0)
+def _height_of(drop: Any, offset: Any) -> Any:
+    """Return the heights at which the logarithm of pressure fell by so much."""
+    tropopause = _log_drop(_TROPOPAUSE_M, offset)
     below = np.minimum(drop, tropopause)
-    height = -_SEA_LEVEL_K / _LAPSE_K_M * np.expm1(-below * _LAPSE_K_M / _HYDROSTATIC_K_M)
-    return height + (drop - below) * _TROPOPAUSE_K / _HYDROSTATIC_K_M
+    warmth = _SEA_LEVEL_K + offset
+    height = -warmth / _LAPSE_K_M * np.expm1(-below * _LAPSE_K_M / _HYDROSTATIC_K_M)
+    return height + (drop - below) * (_TROPOPAUSE_K + offset) / _HYDROSTATIC_K_M

@@ -20,6 +20,7 @@ from components.encounters.pair_densities import MissDistances, PairingRules, pa
 from components.encounters.pairing import PairSampler, set_of_pairs
 from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.sampled_flight import SampledTrajectory
+from components.flights.sampled_segments import STRAIGHT_ROWS
 from components.formats.encounter_set import TRACKS, EncounterSet, fly_events
 from components.formats.set_file import read_set
 from components.formats.text_rows import TrafficFile
@@ -49,10 +50,12 @@ class MadeTogether:
         self._single: dict[Any, Any] = {}
 
     def prepare(self, keys: Iterable[Any]) -> None:
-        """Begin a batch: make what is not known of its keys, and forget what it does not name."""
+        """Begin a batch: make what the last one lacks of its keys, and forget all others.
+
+        What was made of a key alone is made again: what is made at once lies together in memory.
+        """
         wanted = dict.fromkeys(keys)
-        known = self._single | self._batch
-        self._batch = {key: known[key] for key in wanted if key in known}
+        self._batch = {key: self._batch[key] for key in wanted if key in self._batch}
         new = [key for key in wanted if key not in self._batch]
         self._batch.update(zip(new, self._make(new), strict=True))
 
@@ -90,10 +93,13 @@ def _flights_of(keys: Sequence[tuple[EncounterSet, int, str]]) -> list[list[Samp
         alike.setdefault((of.kind, lasts, of.reference_deg, dynamics), []).append(number)
     made: dict[int, SampledTrajectory] = {}
     for numbers in alike.values():
-        width = max(1, CELLS_AT_ONCE // len(_paths([aircraft[numbers[0]]])[0]))
+        count = len(_paths([aircraft[numbers[0]]])[0])
+        table = np.empty((len(numbers) * count, STRAIGHT_ROWS))
+        width = max(1, CELLS_AT_ONCE // count)
         for first in range(0, len(numbers), width):
             some = numbers[first : first + width]
-            made.update(zip(some, _fly_alike([aircraft[k] for k in some]), strict=True))
+            flown = _fly_alike([aircraft[k] for k in some], (table, first * count))
+            made.update(zip(some, flown, strict=True))
     each = iter(range(len(aircraft)))
     return [[made[next(each)] for _ in mine] for mine in rows]
 
@@ -110,7 +116,9 @@ def _paths(aircraft: Sequence[_Craft]) -> tuple[FloatArray, ...]:
     return time_s, *(part[:, np.newaxis] for part in position)
 
 
-def _fly_alike(aircraft: Sequence[_Craft]) -> list[SampledTrajectory]:
+def _fly_alike(
+    aircraft: Sequence[_Craft], place: tuple[FloatArray, int]
+) -> list[SampledTrajectory]:
     time_s, north, east, altitude = _paths(aircraft)
     origin = aircraft[0][0].reference_deg
     lat, lon, _ = enu_to_geodetic(
@@ -118,7 +126,7 @@ def _fly_alike(aircraft: Sequence[_Craft]) -> list[SampledTrajectory]:
         reference_lat_deg=origin[0], reference_lon_deg=origin[1], reference_alt_m=0.0,
     )  # fmt: skip
     names = [encounter_set.names[row] for encounter_set, row, _ in aircraft]
-    return SampledTrajectory.make_all(names, time_s, lat, lon, altitude)
+    return SampledTrajectory.make_all(names, time_s, lat, lon, altitude, place)
 
 
 #: Beyond it nothing can meet; the plane in which encounters lie is far above the ground there.

@@ -53,23 +53,23 @@ def geodesic_parameters(
     n = FLATTENING / (2.0 - FLATTENING)
     semi_minor = SEMI_MAJOR_AXIS_M * (1.0 - FLATTENING)
     # The cosine from the distance to the pole in degrees, which is exact, keeps its digits there.
-    sin_beta = (1.0 - FLATTENING) * _map_numbers(math.sin, _map_numbers(math.radians, lat_deg))
-    cos_beta = _map_numbers(math.sin, _map_numbers(math.radians, 90.0 - abs(lat_deg)))
-    length = _map_numbers(math.hypot, sin_beta, cos_beta)
+    sin_beta = (1.0 - FLATTENING) * each(math.sin, each(math.radians, lat_deg))
+    cos_beta = each(math.sin, each(math.radians, 90.0 - abs(lat_deg)))
+    length = each(math.hypot, sin_beta, cos_beta)
     # At the very pole every meridian starts; a tiny cosine keeps the one that was asked for.
-    sin_beta, cos_beta = sin_beta / length, _map_numbers(_avoid_zero, cos_beta / length)
-    sin_az, cos_az = _map_numbers(math.sin, azimuth_rad), _map_numbers(math.cos, azimuth_rad)
+    sin_beta, cos_beta = sin_beta / length, each(_avoid_zero, cos_beta / length)
+    sin_az, cos_az = each(math.sin, azimuth_rad), each(math.cos, azimuth_rad)
     sin_az0 = sin_az * cos_beta
-    cos_az0 = _map_numbers(math.hypot, cos_az, sin_az * sin_beta)
+    cos_az0 = each(math.hypot, cos_az, sin_az * sin_beta)
     along = cos_az * cos_beta
-    sigma1 = _map_numbers(_arc, sin_beta, along, sin_beta, cos_az)
+    sigma1 = each(_arc, sin_beta, along, sin_beta, cos_az)
     # Not by the sine and cosine of sigma1: near a pole they have lost the longitude.
-    omega1 = _map_numbers(_arc, sin_az0 * sin_beta, along, sin_beta, cos_az)
+    omega1 = each(_arc, sin_az0 * sin_beta, along, sin_beta, cos_az)
     k2 = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED) * cos_az0 * cos_az0
-    eps = k2 / (2.0 * (1.0 + _map_numbers(math.sqrt, 1.0 + k2)) + k2)
+    eps = k2 / (2.0 * (1.0 + each(math.sqrt, 1.0 + k2)) + k2)
     a1, c1, c1_inverse = _distance_series(eps)
     a3, c3 = _longitude_series(eps, n)
-    sines = [_map_numbers(math.sin, 2 * (j + 1) * sigma1) for j in range(len(c1))]
+    sines = [each(math.sin, 2 * (j + 1) * sigma1) for j in range(len(c1))]
     lon_slope = FLATTENING * sin_az0 * a3
     # Radius of curvature along the heading (Euler): what turns metres aloft into metres below.
     meridian, prime_vertical = radii_of_curvature(lat_deg)
@@ -81,14 +81,14 @@ def geodesic_parameters(
     table[_TAU], table[_PER_METRE] = sigma1 + _sum_products(c1, sines), 1.0 / (semi_minor * a1)
     table[_SIN_AZ0], table[_COS_AZ0] = sin_az0, cos_az0
     i3 = sigma1 + _sum_products(c3, sines)
-    table[_LON_RAD] = _map_numbers(math.radians, lon_deg) - omega1 + lon_slope * i3
+    table[_LON_RAD] = each(math.radians, lon_deg) - omega1 + lon_slope * i3
     table[_LON_SLOPE], table[_SIGMA], table[_RADIUS] = lon_slope, sigma1, radius
     table[_INVERSE : _INVERSE + _INVERSE_TERMS] = c1_inverse
     table[_LONGITUDE : _LONGITUDE + _LONGITUDE_TERMS] = c3[:_LONGITUDE_TERMS]
     return table
 
 
-def _map_numbers(function: Callable[..., float], *values: Any) -> Any:
+def each(function: Callable[..., float], *values: Any) -> Any:
     """Return a function of numbers, or of each of the numbers in arrays."""
     if not isinstance(values[0], np.ndarray):
         return function(*values)
@@ -105,9 +105,9 @@ def _arc(y: float, x: float, sin_beta: float, cos_az: float) -> float:
     return math.atan2(y, x) if sin_beta or cos_az else 0.0
 
 
-def _power(base: Any, exponent: int) -> Any:
+def power(base: Any, exponent: int) -> Any:
     """Return a power as Python takes it, also of each value of an array: NumPy's differs."""
-    return _map_numbers(lambda value: value**exponent, base)
+    return each(lambda value: value**exponent, base)
 
 
 def _sum_products(factors: Sequence[Any], sines: Sequence[Any]) -> Any:
@@ -268,13 +268,13 @@ def _longitude_series(eps: Any, n: float) -> tuple[Any, list[Any]]:
                 + eps * (3 / 64 + n * (3 / 64 - n / 64) + eps * (5 / 128 + n / 64 + eps * 3 / 128))
             )
         ),
-        _power(eps, 2)
+        power(eps, 2)
         * (
             1 / 16
             - n * (3 / 32 - n / 32)
             + eps * (3 / 64 - n * (1 / 32 + n * 3 / 64) + eps * (3 / 128 + n / 128 + eps * 5 / 256))
         ),
-        _power(eps, 3)
+        power(eps, 3)
         * (5 / 192 - n * (3 / 64 - n * 5 / 192) + eps * (3 / 128 - n * 5 / 192 + eps * 7 / 512)),
     ]
     return a3, c3

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from geographiclib.geodesic import Geodesic
 
-from components.flights.geodesic_motion import geodesic_state
+from components.flights.geodesic_motion import each, geodesic_state, power
 from components.geometry import (
     ECCENTRICITY_SQUARED,
     TWO_PI,
@@ -36,71 +36,82 @@ TURN_ROWS = 16
 
 
 def turn_parameters(
-    lat_deg: float,
-    lon_deg: float,
-    alt_m: float,
-    azimuth_rad: float,
-    speed_mps: float,
-    climb_mps: float,
-    rate_rad_s: float,
+    lat_deg: Any,
+    lon_deg: Any,
+    alt_m: Any,
+    azimuth_rad: Any,
+    speed_mps: Any,
+    climb_mps: Any,
+    rate_rad_s: Any,
 ) -> FloatArray:
-    """Prepare a turn: everything that does not depend on time.
+    """Prepare a turn (rows,), or many (rows, n), each to the bit as it would be alone: everything
+    that does not depend on time.
 
     The circle lies around its own centre in the chart (east, north) -> (angle about the centre's
     prime-vertical and meridian radii), so it is round in metres although the ellipsoid's two
     radii differ by up to 0.7 %, and it returns to where it began.
     """
-    radius = abs(speed_mps / rate_rad_s)
-    if radius > LARGEST_TURN_RADIUS_M:
+    given = lat_deg, lon_deg, alt_m, azimuth_rad, speed_mps, climb_mps, rate_rad_s
+    lat, lon, alt, azimuth, speed, climb, rate = (np.atleast_1d(value) for value in given)
+    radius = np.abs(speed / rate)
+    for number in np.flatnonzero(radius > LARGEST_TURN_RADIUS_M)[:1].tolist():
         raise ValueError(
-            f"turn radius is {radius:.0f} metres ({speed_mps:g} m/s at "
-            f"{math.degrees(rate_rad_s):g} deg/s): it must not exceed {LARGEST_TURN_RADIUS_M:g}; "
+            f"turn radius is {radius[number]:.0f} metres ({speed[number]:g} m/s at "
+            f"{math.degrees(rate[number]):g} deg/s): it must not exceed {LARGEST_TURN_RADIUS_M:g}; "
             "use a straight leg or waypoints"
         )
-    table = _circle(lat_deg, lon_deg, alt_m, azimuth_rad, radius, rate_rad_s, climb_mps)
+    table = _circles(lat, lon, alt, azimuth, radius, rate, climb)
     # The circle in the chart is off the azimuth by some 1e-8 to 1e-6 rad, which turns in a row
     # would add up: it is begun as much the other way.
-    yaw = float(turn_state(table, np.zeros(1))[3][0])
-    off_rad = math.remainder(yaw - azimuth_rad, 2.0 * math.pi)
-    return _circle(lat_deg, lon_deg, alt_m, azimuth_rad - off_rad, radius, rate_rad_s, climb_mps)
+    yaw = turn_state(table, np.zeros(len(lat)))[3]
+    off_rad = each(_short_way, yaw - azimuth)
+    table = _circles(lat, lon, alt, azimuth - off_rad, radius, rate, climb)
+    return table if np.ndim(lat_deg) else np.ascontiguousarray(table[:, 0])
 
 
-def _circle(
-    lat_deg: float,
-    lon_deg: float,
-    alt_m: float,
-    azimuth_rad: float,
-    radius: float,
-    rate_rad_s: float,
-    climb_mps: float,
+def _short_way(angle_rad: float) -> float:
+    return math.remainder(angle_rad, 2.0 * math.pi)
+
+
+def _circles(
+    lat_deg: FloatArray,
+    lon_deg: FloatArray,
+    alt_m: FloatArray,
+    azimuth_rad: FloatArray,
+    radius: FloatArray,
+    rate_rad_s: FloatArray,
+    climb_mps: FloatArray,
 ) -> FloatArray:
-    """Return the table of a circle whose centre lies abeam of an azimuth."""
+    """Return the table of circles whose centres lie abeam of azimuths."""
     meridian, prime_vertical = radii_of_curvature(lat_deg)
-    side = math.copysign(0.5 * math.pi, rate_rad_s)
+    side = np.copysign(0.5 * math.pi, rate_rad_s)
     # Metres aloft to metres on the ellipsoid, along the line to the centre (abeam).
-    cos2, sin2 = math.sin(azimuth_rad) ** 2, math.cos(azimuth_rad) ** 2
-    abeam = 1.0 / (cos2 / float(meridian) + sin2 / float(prime_vertical))
-    centre = Geodesic.WGS84.Direct(
-        lat_deg,
-        lon_deg,
-        math.degrees(azimuth_rad + side),
-        radius * abeam / (abeam + alt_m),
-    )
-    c_lat, c_lon = np.array([centre["lat2"]]), np.array([centre["lon2"]])
-    axes = [np.array(axis)[:, 0] for axis in local_axes(c_lat, c_lon)]
-    start = np.array(local_axes(np.array([lat_deg]), np.array([lon_deg]))[2])[:, 0]
-    c_meridian, c_prime_vertical = radii_of_curvature(float(c_lat[0]))
+    cos2, sin2 = (power(each(of, azimuth_rad), 2) for of in (math.sin, math.cos))
+    abeam = 1.0 / (cos2 / meridian + sin2 / prime_vertical)
+    ways = each(math.degrees, azimuth_rad + side), radius * abeam / (abeam + alt_m)
+    places = zip(*(value.tolist() for value in (lat_deg, lon_deg, *ways)), strict=True)
+    centres = [Geodesic.WGS84.Direct(*place) for place in places]
+    c_lat, c_lon = (np.array([one[name] for one in centres]) for name in ("lat2", "lon2"))
+    axes = np.array(local_axes(c_lat, c_lon))
+    starts = np.array(local_axes(lat_deg, lon_deg)[2]).T.copy()
+    of_each = np.ascontiguousarray(axes.transpose(2, 0, 1))
+    east, north, up = np.array(
+        [[axis @ start for axis in of_one] for of_one, start in zip(of_each, starts, strict=True)]
+    ).T
+    c_meridian, c_prime_vertical = radii_of_curvature(c_lat)
     per_east, per_north = 1.0 / (c_prime_vertical + alt_m), 1.0 / (c_meridian + alt_m)
-    east, north, up = (float(axis @ start) for axis in axes)
-    chord = math.hypot(east, north)
-    stretch = math.atan2(chord, up) / chord if chord else 1.0
-    x, y = east * stretch / float(per_east), north * stretch / float(per_north)
-    table = np.empty(TURN_ROWS)
-    table[_EAST : _EAST + 3], table[_NORTH : _NORTH + 3], table[_UP : _UP + 3] = axes
+    stretch = each(_stretch, each(math.hypot, east, north), up)
+    x, y = east * stretch / per_east, north * stretch / per_north
+    table = np.empty((TURN_ROWS, len(lat_deg)))
+    table[_EAST : _UP + 3] = axes.reshape(9, -1)
     table[_PER_EAST], table[_PER_NORTH] = per_east, per_north
-    table[_RADIUS], table[_PHASE] = math.hypot(x, y), math.atan2(x, y)
+    table[_RADIUS], table[_PHASE] = each(math.hypot, x, y), each(math.atan2, x, y)
     table[_RATE], table[_ALT], table[_CLIMB] = rate_rad_s, alt_m, climb_mps
     return table
+
+
+def _stretch(chord: float, up: float) -> float:
+    return math.atan2(chord, up) / chord if chord else 1.0
 
 
 def turn_state(

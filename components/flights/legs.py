@@ -288,3 +288,54 @@ class LegBuilder:
             lat, lon, alt, yaw = (float(v[0]) for v in state)
             self.position, self.heading = (lat, lon, alt), yaw
         return duration
+
+
+def fly_each(
+    start: Sequence[FloatArray], heading_rad: FloatArray, legs: Sequence[Sequence[Straight | Turn]]
+) -> list[list[Segment]]:
+    """Return the segments of flights from positions (n,) on, as a `LegBuilder` would of each.
+
+    Every leg has its speed and its climb, and every turn its rate.
+    """
+    here, times_s = np.stack([*start, heading_rad]), [0.0] * len(legs)
+    segments: list[list[Segment]] = [[] for _ in legs]
+    for number in range(max(map(len, legs), default=0)):
+        alike: dict[Kind, list[int]] = {}
+        for k, mine in enumerate(legs):
+            if number < len(mine) and mine[number].duration_s != 0.0:
+                alike.setdefault(_kind_of(mine[number]), []).append(k)
+        for kind, flown in alike.items():
+            now = [legs[k][number] for k in flown]
+            rates = [math.radians(getattr(leg, "rate_deg_s", None) or 0.0) for leg in now]
+            motion = [(leg.speed_mps or 0.0, leg.climb_mps or 0.0) for leg in now]
+            speed, climb, rate = (np.array(of) for of in (*zip(*motion, strict=True), rates))
+            lat, lon, alt, heading = here[:, flown]
+            if kind == "hold":
+                table = np.stack([lat, lon, alt, climb, heading, rate])
+            elif kind == "turn":
+                table = turn_parameters(lat, lon, alt, heading, speed, climb, rate)
+            else:
+                table = geodesic_parameters(lat, lon, alt, heading, speed, climb)
+            for column, (k, leg) in enumerate(zip(flown, now, strict=True)):
+                mps, climb_mps = motion[column]
+                pitch = bank = 0.0
+                if kind != "hold":
+                    pitch = math.atan2(climb_mps, mps)
+                    bank = math.atan2(mps * rates[column], STANDARD_GRAVITY_M_S2)
+                along = abs(climb_mps) if kind == "hold" else mps / math.cos(pitch)
+                own = np.ascontiguousarray(table[:, column])
+                segments[k].append(Segment(kind, times_s[k], own, pitch, bank, along))
+                times_s[k] += leg.duration_s or 0.0
+            some = [column for column, leg in enumerate(now) if leg.duration_s is not None]
+            if some:
+                # The clock's own difference, so that the next leg starts exactly where this one is.
+                elapsed_s = [times_s[flown[j]] - segments[flown[j]][-1].start_s for j in some]
+                ends = FORMULAS[kind](np.ascontiguousarray(table[:, some]), np.array(elapsed_s))
+                here[:, [flown[j] for j in some]] = ends
+    return segments
+
+
+def _kind_of(leg: Straight | Turn) -> Kind:
+    if not leg.speed_mps:
+        return "hold"
+    return "turn" if isinstance(leg, Turn) else "geodesic"

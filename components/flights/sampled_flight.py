@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,8 @@ from components.flights.fleet import (
     evaluate_in_blocks,
 )
 from components.flights.sampled_segments import (
+    ATTITUDE_ROWS,
+    POSITION_ROWS,
     STRAIGHT_ROWS,
     all_within_limits,
     checked_samples,
@@ -53,6 +55,16 @@ class SampledTrajectory:
     `wind_east_north_mps`. After samples that are `away` (n,) it is not there until the next one.
     ValueError names what cannot be.
     """
+
+    #: Position and attitude at the samples.
+    lat_deg: FloatArray
+    lon_deg: FloatArray
+    alt_m: FloatArray
+    yaw_rad: FloatArray
+    pitch_rad: FloatArray
+    roll_rad: FloatArray
+    #: A table of a fleet that holds its coefficients, and in which row they begin.
+    place: tuple[FloatArray, int] | None = None
 
     def __init__(
         self,
@@ -133,6 +145,12 @@ class SampledTrajectory:
             )
         return tuple(np.concatenate(parts) for parts in zip(*pieces, strict=True))
 
+    def __getattr__(self, name: str) -> Any:
+        """Return what a flight that was made with others has in its coefficients only."""
+        if name not in _ROWS:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return np.ascontiguousarray(self.coefficients[_ROWS[name]])
+
     @cached_property
     def coefficients(self) -> FloatArray:
         """Each segment's polynomials, (25, samples)."""
@@ -151,14 +169,23 @@ class SampledTrajectory:
         lat_deg: FloatArray,
         lon_deg: FloatArray,
         alt_m: FloatArray,
+        place: tuple[FloatArray, int] | None = None,
     ) -> list[SampledTrajectory]:
-        """Return aircraft that are known at the same times, as each would be made alone."""
+        """Return aircraft that are known at the same times, as each would be made alone.
+
+        Their coefficients go to a table that is given, from a row on, or to one of their own.
+        """
+        count = len(time_s)
+        table, start = place or (np.empty((len(names) * count, STRAIGHT_ROWS)), 0)
         flights: list[SampledTrajectory] = []
-        width = max(1, CELLS_AT_ONCE // max(1, len(time_s)))
+        width = max(1, CELLS_AT_ONCE // max(1, count))
         for first in range(0, len(names), width):
             block = slice(first, first + width)
-            position = [np.ascontiguousarray(part[:, block]) for part in (lat_deg, lon_deg, alt_m)]
-            flights += cls._make_all_alike(names[block], time_s, *position)
+            lat, lon, alt = (
+                np.ascontiguousarray(part[:, block]) for part in (lat_deg, lon_deg, alt_m)
+            )
+            at = table, start + first * count
+            flights += cls._make_all_alike(names[block], time_s, lat, lon, alt, at)
         return flights
 
     @classmethod
@@ -169,32 +196,37 @@ class SampledTrajectory:
         lat_deg: FloatArray,
         lon_deg: FloatArray,
         alt_m: FloatArray,
+        place: tuple[FloatArray, int],
     ) -> list[SampledTrajectory]:
-        one = cls(names[0], time_s, lat_deg[:, 0], lon_deg[:, 0], alt_m[:, 0])
         columns = {"lat_deg": lat_deg, "lon_deg": lon_deg, "alt_m": alt_m}
-        for number in range(1, len(names)) if not all_within_limits(columns) else ():
-            checked_samples(
+        for number in range(1 if all_within_limits(columns) else len(names)):
+            given = checked_samples(
                 names[number], time_s=time_s, **{k: v[:, number] for k, v in columns.items()}
             )
         position = (lat_deg, wrap_longitude_deg(lon_deg), alt_m)
         yaw, pitch, roll = attitude_from_path(time_s, *position)
-        attitude = wrap_heading_rad(yaw), pitch, roll
-        tables = fit_segments(time_s, position, attitude)
-        rows = [np.ascontiguousarray(part.T) for part in (*position, *attitude)]
-        speeds = _mean_speed_bound(time_s, *position)
-        flights = [one]
-        for number, name in enumerate(names[1:], start=1):
-            made = copy(one)
-            made.name = name
-            made.lat_deg, made.lon_deg, made.alt_m = (part[number] for part in rows[:3])
-            made.yaw_rad, made.pitch_rad, made.roll_rad = (part[number] for part in rows[3:])
-            made.coefficients = np.ascontiguousarray(tables[..., number])
-            made.max_speed_mps = float(speeds[number])
+        fitted = fit_segments(time_s, position, (wrap_heading_rad(yaw), pitch, roll))
+        speeds = _mean_speed_bound(time_s, *position).tolist()
+        (table, end), flights = place, []
+        for number, (name, speed_mps) in enumerate(zip(names, speeds, strict=True)):
+            start, end = end, end + len(time_s)
+            table[start:end] = fitted[..., number].T
+            made = cls.__new__(cls)
+            made.name, made.sample_times_s = name, given["time_s"]
+            made.velocity_enu_mps, made.velocity_was_ignored = None, False
+            made.derived_attitude, made.away = ("yaw", "pitch", "roll"), None
+            made.coefficients, made.place = table[start:end].T, (table, start)
+            made.max_speed_mps = speed_mps
             flights.append(made)
         return flights
 
-    def with_wind(self, east_mps: float, north_mps: float) -> SampledTrajectory:
-        """Return the same flight with what was derived of its attitude derived with a wind."""
+    def in_air(
+        self, east_mps: float, north_mps: float, alt_m: FloatArray | None = None
+    ) -> SampledTrajectory:
+        """Return the same flight with what was derived of its attitude derived with a wind.
+
+        With `alt_m` it is at these altitudes.
+        """
         known = {
             f"{angle}_rad": getattr(self, f"{angle}_rad")
             for angle in ("yaw", "pitch", "roll")
@@ -205,7 +237,7 @@ class SampledTrajectory:
             self.sample_times_s,
             self.lat_deg,
             self.lon_deg,
-            self.alt_m,
+            self.alt_m if alt_m is None else alt_m,
             velocity_enu_mps=self.velocity_enu_mps,
             wind_east_north_mps=(east_mps, north_mps),
             away=self.away,
@@ -219,7 +251,8 @@ class SampledTrajectory:
         segment, elapsed, present = locate(self.sample_times_s, flat)
         if self.away is not None:
             present &= ~self.away[segment] | (elapsed == 0.0)
-        state = evaluate_segments(self.coefficients[:, segment], elapsed, present)
+        table = np.ascontiguousarray(self.coefficients[:, segment])
+        state = evaluate_segments(table, elapsed, present)
         return state.reshape(times.shape)
 
     def interval_present(self) -> tuple[float, float]:
@@ -255,9 +288,23 @@ class SampledFleet(Fleet):
         return [(self._flights[of[0]].sample_times_s, of) for of in by_bytes.values()]
 
     @cached_property
-    def _table(self) -> FloatArray:
-        """What is known of each segment, one after the other: in a row of the memory."""
-        return _side_by_side([flight.coefficients for flight in self._flights])
+    def _table(self) -> tuple[FloatArray, IntArray | None]:
+        """What is known of each segment: in a row of the memory, the segments of each together.
+
+        With it goes how much later those of each are than in order; None for nowhere. A table is
+        there once: flights have theirs from there, and so has another fleet of some of them.
+        """
+        places = [flight.place for flight in self._flights]
+        table = places[0][0] if places and places[0] is not None else None
+        if table is None or any(place is None or place[0] is not table for place in places):
+            table, end = _side_by_side([flight.coefficients for flight in self._flights]), 0
+            for flight in self._flights:
+                start, end = end, end + len(flight.sample_times_s)
+                flight.coefficients = table[start:end, : len(flight.coefficients)].T
+                flight.place = table, start
+            return table, None
+        starts = [place[1] for place in places if place is not None]
+        return table, np.array(starts, dtype=np.int64) - self._find.first
 
     @cached_property
     def _away_segments(self) -> BoolArray | None:
@@ -298,9 +345,10 @@ class SampledFleet(Fleet):
                 present[:, columns] = there[:, np.newaxis]
             if self._away_segments is not None:
                 present &= ~self._away_segments[index] | (elapsed == 0.0)
-            values = evaluate_segments(
-                self._segments(index.reshape(-1)), elapsed.reshape(-1), present.reshape(-1)
-            ).reshape(shape)
+            aircraft = np.broadcast_to(np.arange(count), shape).reshape(-1)
+            table = self._segments(index.reshape(-1), aircraft)
+            values = evaluate_segments(table, elapsed.reshape(-1), present.reshape(-1))
+            values = values.reshape(shape)
             for out, value in zip(state.arrays(), values.arrays(), strict=True):
                 out[block] = value
         return state
@@ -309,8 +357,10 @@ class SampledFleet(Fleet):
         """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
         return evaluate_in_blocks(self._state, aircraft, time_s)
 
-    def _segments(self, index: IntArray) -> FloatArray:
-        return np.ascontiguousarray(self._table.take(index, axis=0).T)
+    def _segments(self, index: IntArray, aircraft: IntArray) -> FloatArray:
+        table, later = self._table
+        index = index if later is None else index + later.take(aircraft)
+        return np.ascontiguousarray(table.take(index, axis=0).T)
 
     def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         samples, first, last = self._find.starts_s, self._find.first, self._find.last
@@ -322,7 +372,11 @@ class SampledFleet(Fleet):
         elapsed = inside - samples[segment]
         if self._away_segments is not None:
             present &= ~self._away_segments[segment] | (elapsed == 0.0)
-        return evaluate_segments(self._segments(segment), elapsed, present)
+        return evaluate_segments(self._segments(segment, aircraft), elapsed, present)
+
+
+_NAMES = "lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad"
+_ROWS = dict(zip(_NAMES, (*POSITION_ROWS, *ATTITUDE_ROWS), strict=True))
 
 
 def _side_by_side(tables: Sequence[FloatArray]) -> FloatArray:

@@ -36,6 +36,8 @@ _LAT, _LON, _YAW, _YAW_RATE, _TURN_WITH_LON = 0, 1, 2, 3, 4
 _PITCH, _PITCH_RATE, _ROLL, _ROLL_RATE = 5, 6, 7, 8
 _START, _SLOPE, _SECOND, _THIRD = 9, 13, 17, 21
 STRAIGHT_ROWS, BENT_ROWS = 17, 25
+#: Where samples stand: latitude, longitude (deg), altitude (m); yaw, pitch and roll (rad).
+POSITION_ROWS, ATTITUDE_ROWS = (_LAT, _LON, _START + 3), (_YAW, _PITCH, _ROLL)
 
 
 #: Times, longitudes and angles beyond this carry no useful digits any more.

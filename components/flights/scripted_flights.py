@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 from math import inf, isfinite, isnan, radians
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -120,7 +120,7 @@ class ScriptedTrajectory:
         return cls(name, **position, reference=reference, **others)
 
     @classmethod
-    def of_segments(cls, *known: Any) -> ScriptedTrajectory:
+    def of_segments(cls, *known: Any) -> Self:
         """Return a flight whose segments are known already; see `_set_segments`."""
         flight = cls.__new__(cls)
         flight._set_segments(*known)

@@ -5,17 +5,22 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from functools import lru_cache
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from components.arguments.units import STANDARD_GRAVITY_M_S2
-from components.flights.leg_motion import LARGEST_TURN_RADIUS_M
-from components.flights.legs import AnyLeg, Straight, Turn
+from components.flights.leg_motion import LARGEST_TURN_RADIUS_M, Segment
+from components.flights.legs import Straight, Turn, fly_each
 from components.flights.point_mass import eased_turn_rates
-from components.flights.scripted_flights import ScriptedTrajectory
-from components.geometry import TrajectoryState, line_of_sight_ned
+from components.flights.scripted_flights import MOST_ALT_M, ScriptedTrajectory
+from components.geometry import (
+    TrajectoryState,
+    heading_from_deg,
+    line_of_sight_ned,
+    wrap_longitude_deg,
+)
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.types import FloatArray
 
@@ -111,9 +116,9 @@ class SteeringPlan(NamedTuple):
             )
         return plan
 
-    def legs(self) -> list[AnyLeg]:
+    def legs(self) -> list[Straight | Turn]:
         """Return it as legs, each as long as nothing changes; the last one is for ever."""
-        legs: list[AnyLeg] = []
+        legs: list[Straight | Turn] = []
         plan = self
         while plan.turns or plan.climbs or plan.speeds:
             parts = plan.turns, plan.climbs, plan.speeds
@@ -128,7 +133,7 @@ class SteeringPlan(NamedTuple):
 
 def _leg(
     lasts_s: float | None, speed_mps: float, climb_mps: float, rate_deg_s: float = 0.0
-) -> AnyLeg:
+) -> Straight | Turn:
     """Return a leg; what a plan holds is sound and not checked again."""
     flown: dict[str, Any] = {
         "duration_s": lasts_s, "speed_mps": speed_mps, "climb_mps": climb_mps,
@@ -226,7 +231,7 @@ def steered_parts(
     `around` says where each would be without it, (n, 3), at `times_around_s`. Parts of an
     earlier manoeuvre, `before`, that are not commanded anew go on.
     """
-    flown = []
+    starts: list[_Start] = []
     ways = chords(around, time_s) if any(one is None for one in before) else []
     rows = zip(time_s.tolist(), manoeuvres, before, strict=True)
     for row, (at_s, manoeuvre, earlier) in enumerate(rows):
@@ -254,7 +259,12 @@ def steered_parts(
             rate_rad_s = math.radians(_mean(plan.turns, 0.0, 0.0))
         turning = Turning(math.radians(heading_deg), rate_rad_s, turned_rad)
         plan = plan.with_manoeuvre(manoeuvre, here, turning)
-        flown.append(_steered_part(name, position, heading_deg, at_s, plan))
+        starts.append(_Start(name, position, heading_deg, at_s, plan))
+    new = [start for start in dict.fromkeys(starts) if start not in _KNOWN]
+    _KNOWN.update(zip(new, _fly_plans(new), strict=True))
+    flown = [_KNOWN[start] for start in starts]
+    while len(_KNOWN) > _MOST_KNOWN:
+        del _KNOWN[next(iter(_KNOWN))]
     return flown
 
 
@@ -288,26 +298,52 @@ def _remaining_climb(climb_mps: float, manoeuvre: Manoeuvre) -> float:
     return 0.0 if ends and manoeuvre.vertical_speed_mps == 0.0 else climb_mps
 
 
-# A study's metrics fly again what its runs flew.
-@lru_cache(maxsize=4096)
-def _steered_part(
-    name: str,
-    position: tuple[float, float, float],
-    heading_deg: float,
-    time_s: float,
-    plan: SteeringPlan,
-) -> SteeredPart:
-    part = SteeredPart(
-        name,
-        lat_deg=position[0],
-        lon_deg=position[1],
-        alt_m=position[2],
-        heading_deg=heading_deg,
-        speed_mps=plan.speed_mps,
-        legs=plan.legs(),
-        start_time_s=time_s,
-    )
-    part.plan = plan
+class _Start(NamedTuple):
+    """Where what is flown by a plan begins."""
+
+    name: str
+    position: tuple[float, float, float]
+    heading_deg: float
+    time_s: float
+    plan: SteeringPlan
+
+
+#: A study's metrics fly again what its runs flew.
+_KNOWN: dict[_Start, SteeredPart] = {}
+_MOST_KNOWN = 4096
+
+
+def _fly_plans(starts: Sequence[_Start]) -> list[SteeredPart]:
+    """Return what is flown from some places on, each as its script would be by itself."""
+    if not starts:
+        return []
+    legs = [start.plan.legs() for start in starts]
+    headings = np.array([heading_from_deg(start.heading_deg) for start in starts])
+    lat_deg, lon_deg, alt_m = np.array([start.position for start in starts]).T
+    speeds = [start.plan.speed_mps for start in starts]
+    known = np.isfinite([lat_deg, lon_deg, alt_m, headings, speeds])
+    if known.all() and np.abs(alt_m).max() <= MOST_ALT_M and min(speeds) >= 0.0:
+        with suppress(ValueError):
+            here = lat_deg, wrap_longitude_deg(lon_deg), alt_m
+            return [
+                _part(start, segments)
+                for start, segments in zip(starts, fly_each(here, headings, legs), strict=True)
+            ]
+    return [  # each by itself, which says what is wrong
+        _part(start, ScriptedTrajectory(
+            start.name,
+            lat_deg=start.position[0], lon_deg=start.position[1], alt_m=start.position[2],
+            heading_deg=start.heading_deg, speed_mps=start.plan.speed_mps, legs=mine,
+            start_time_s=start.time_s,
+        ).segments)
+        for start, mine in zip(starts, legs, strict=True)
+    ]  # fmt: skip
+
+
+def _part(start: _Start, segments: list[Segment]) -> SteeredPart:
+    free = (None, None, None)
+    part = SteeredPart.of_segments(start.name, segments, free, start.time_s, math.inf)
+    part.plan = start.plan
     return part
 
 

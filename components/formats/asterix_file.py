@@ -22,7 +22,7 @@ from components.formats.recording import Recording
 from components.formats.sample_columns import Altitude, SampleColumn, enu_velocity
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import Problems, TrafficFileError
-from components.geometry import radii_of_curvature, wrap_pi
+from components.geometry import enu_to_geodetic, radii_of_curvature, wrap_pi
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.files.input_files import InputFileError, read_input_bytes
 
@@ -79,8 +79,12 @@ def record_asterix(
     ownship: str | None = None,
     of_day_s: float | None = None,
     least: int = 1,
+    place: tuple[float, float, float] | None = None,
 ) -> Recording:
     """Return the aircraft of data blocks: system tracks (062) and ADS-B reports (021).
+
+    Where there are none, those of radars' plots (048) that say whose they are, each by the radar
+    that saw it first; `place` is where radars are that do not say it (latitude, longitude, m).
 
     The ownship is said by its identification, or as ``"SAC/SIC/number"`` where it has none; left
     out, it is the aircraft called ``OWNSHIP``, or else the first one. Heights are flight levels, of
@@ -93,6 +97,9 @@ def record_asterix(
     if of_day_s is not None and records:
         day_s = DAY_S * round((of_day_s - records[0].time_s) / DAY_S)
     names = _names(records)
+    if not names:
+        records = _of_plots(problems, records, place, warnings)
+        names = _names(records)
     kinds: list[Altitude] = ["barometric", "geometric"] if altitude is None else [altitude]
     heights = dict(zip(("alt", "alt instead"), kinds, strict=False))
     headers = ("time", "lat", "lon", *(f"{kind} altitude" for kind in kinds), *_MOVES)
@@ -129,12 +136,7 @@ def record_asterix(
     for k, row in samples.items():
         table.add_row(k + 1, row)
     if not names:
-        plots = sum(record.category == PLOTS for record in records)
-        seen = (
-            f"; its {plots} plots of radars (048) are no aircraft yet: sensor.recorded reads them"
-            if plots else ""
-        )  # fmt: skip
-        problems.fail(f"there are no system tracks (062) and no ADS-B reports (021) in it{seen}")
+        problems.fail("there are no system tracks (062) and no ADS-B reports (021) in it")
     if ownship is None and _OWNSHIP in names.values():
         ownship = _OWNSHIP
     return table.recording(
@@ -142,6 +144,67 @@ def record_asterix(
         lambda columns: {**columns, **enu_velocity(columns), "time": columns["time"] + day_s},
         kind="ASTERIX", units="the units of its items",
     )  # fmt: skip
+
+
+def _of_plots(
+    problems: Problems,
+    records: list[AsterixRecord],
+    place: tuple[float, float, float] | None,
+    warnings: list[str],
+) -> list[AsterixRecord]:
+    """Return plots that say whose they are as reports: by address, else as a radar's tracks."""
+    plots = [one for one in records if one.category == PLOTS]
+    named = [one for one in plots if {"number", "track", "code"} & one.values.keys()]
+    seen = [
+        one for one in named
+        if "range_m" in one.values and {"alt_m", "flight_level_m"} & one.values.keys()
+    ]  # fmt: skip
+    if plots and not seen:
+        problems.fail(
+            f"none of its {len(plots)} plots of radars (048) says whose it is and how high: "
+            "sensor.recorded takes them as detections"
+        )
+    places: dict[str, tuple[float, float, float]] = {}
+    for one in records:
+        if one.category == SERVICE and {"lat_deg", "lon_deg", "alt_m"} <= one.values.keys():
+            lat_deg, lon_deg, alt_m = (one.values[name] for name in ("lat_deg", "lon_deg", "alt_m"))
+            places.setdefault(_source(one), (lat_deg, lon_deg, alt_m))
+    first: dict[int, str] = {}
+    kept, at = [], []
+    for one in seen:
+        values, source = dict(one.values), _source(one)
+        radar = places.get(source, place)
+        if radar is None:
+            problems.fail(
+                f"radar {source}, whose plots (048) these are, does not say where it is (034, item "
+                "120): place = { lat_deg, lon_deg, alt_m } of traffic.file says it, and "
+                "sensor.recorded takes plots as detections"
+            )
+        category = ADS_B if "number" in values else SYSTEM_TRACKS
+        if category == SYSTEM_TRACKS and "track" in values:
+            values["number"] = values["track"]
+        elif category == SYSTEM_TRACKS:  # beyond the numbers of tracks
+            values |= {"number": 4096 + values["code"], "name": f"A{values['code']:04o}"}
+        elif first.setdefault(values["number"], source) != source:
+            continue
+        high_m = values.get("flight_level_m", values.get("alt_m"))
+        at.append((np.radians(values["azimuth_deg"]), values["range_m"], high_m, *radar))
+        kept.append(AsterixRecord(category, one.time_s, values))
+    azimuth, far_m, high, lat, lon, alt = np.array(at, float).reshape(-1, 6).T
+    up = _elevations(azimuth, far_m, high, lat, alt)
+    level_m = far_m * np.cos(up)
+    there = enu_to_geodetic(
+        level_m * np.sin(azimuth), level_m * np.cos(azimuth), far_m * np.sin(up),
+        reference_lat_deg=lat, reference_lon_deg=lon, reference_alt_m=alt,
+    )  # fmt: skip
+    reports = [
+        one._replace(values={**one.values, "lat_deg": float(lat_deg), "lon_deg": float(lon_deg)})
+        for one, lat_deg, lon_deg in zip(kept, *there[:2], strict=True)
+    ]
+    if len(reports) < len(plots):
+        said = "do not say whose they are or how high, or are of aircraft that another radar sees"
+        warnings.append(f"{len(plots) - len(reports)} plots are left out that {said}")
+    return reports
 
 
 _AIRCRAFT = (SYSTEM_TRACKS, ADS_B)

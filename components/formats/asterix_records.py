@@ -66,6 +66,10 @@ FIELDS: Mapping[int, Mapping[str, _Field]] = {
         "alt_m": _Field("110", "3DH", _LEVEL_M, 14, True),
         "flight_level_m": _Field("090", "FL", _LEVEL_M, 14, True),
         "range_rate_m_s": _Field("120", "CAL/CAL", 1.0, 10, True),
+        "number": _Field("220", None, 1, 24),
+        "track": _Field("161", "TRN", 1, 12),
+        "code": _Field("070", "MODE3A", 1, 12),
+        "name": _Field("240", None, 0, 48),
     },
     SYSTEM_TRACKS: {
         "sac": _Field("010", "SAC", 1, 8),

@@ -41,8 +41,12 @@ class Log(NamedTuple):
     rows: str = "reports"
     #: What its reader has to say of it, when the reports are read.
     warnings: Sequence[str] = ()
+    #: What its geometric heights are above; of receivers and flight recorders the ellipsoid.
+    geometric: str = "geometric altitude"
 
 
+#: Of GPX, KML and autopilots.
+ABOVE_SEA = "geometric altitude above mean sea level"
 _MOVES = {"trk": "track", "gs": "speed", "vs": "climb rate"}
 _ANGLES = ("yaw", "pitch", "roll")
 #: Where values stand in a report.
@@ -62,7 +66,10 @@ def recording_of(
     heights = dict(zip(("alt", "alt instead"), kinds, strict=False))
     headers = {
         "time": "time", "lat": "lat", "lon": "lon",
-        **{key: f"{kind} altitude" for key, kind in heights.items()},
+        **{
+            key: log.geometric if kind == "geometric" else f"{kind} altitude"
+            for key, kind in heights.items()
+        },
         **_MOVES, **{angle: angle for angle in _ANGLES},
     }  # fmt: skip
     columns = {

@@ -6,12 +6,10 @@ avoid maneuver decisions", MIT Lincoln Laboratory, ATC-434, 2017, tells how they
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from components.arguments.units import FOOT_M
-from dsa_des.arrays.types import FloatArray
 
 #: Shape of the time that coordination with air traffic control takes, a gamma distribution.
 COORDINATION_SHAPE = 5.5
@@ -98,12 +96,12 @@ def steering(
 
 
 def response_s(
-    uniforms: FloatArray | None, initial_s: float, coordination_s: float, execution_s: float
+    uniforms: Sequence[float] | None, initial_s: float, coordination_s: float, execution_s: float
 ) -> tuple[float, float]:
     """Return how long a pilot takes to react and coordinate, and then to begin the manoeuvre."""
     if uniforms is None:
         return initial_s + coordination_s, execution_s
-    first, second, third = np.asarray(uniforms, dtype=np.float64).tolist()
+    first, second, third = uniforms
     waits_s = exponential(first, initial_s)
     if coordination_s > 0.0:
         waits_s += gamma(second, COORDINATION_SHAPE, coordination_s / COORDINATION_SHAPE)

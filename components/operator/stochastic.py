@@ -12,6 +12,7 @@ from components.guidance.daidalus import ConfParameters, changes_out_of_bands, e
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.operator.pilot_model import Draws, mean_pause_s, pause_s, response_s, steering
+from dsa_des.arrays.keyed_table import turns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
@@ -166,17 +167,15 @@ class Stochastic(Component):
         highest, runs = alerts.highest(), wake.run
         choosing: list[tuple[int, Mind]] = []
         acting: list[tuple[int, int]] = []
-        for index in np.flatnonzero(self._has_to_do(wake, highest)).tolist():
-            run = int(runs[index])
-            mind = self._minds.get(run, Mind(run))
-            mind, chooses, acts = self._follow_level(
-                mind, int(wake.ticks[index]), int(highest[index])
-            )
-            self._minds[run], self._next[run] = mind, self._next_tick(mind)
-            if chooses:
-                choosing.append((index, mind))
-            if acts:
-                acting.append((index, run))
+        has_to_do = np.flatnonzero(self._has_to_do(wake, highest))
+        for turn in turns(runs[has_to_do]):  # the first row of every run, then the next
+            rows = has_to_do[turn]
+            minds = [self._minds.get(run, Mind(run)) for run in runs[rows].tolist()]
+            chooses, acts = self._follow(minds, wake.ticks[rows], highest[rows].tolist())
+            for mind in minds:
+                self._minds[mind.run], self._next[mind.run] = mind, self._next_tick(mind)
+            choosing += [(int(rows[k]), minds[k]) for k in chooses]
+            acting += [(int(rows[k]), minds[k].run) for k in acts]
         return Manoeuvres.at_rows(wake.instants, self._begin_manoeuvres(alerts, choosing, acting))
 
     def _has_to_do(self, wake: Wake, highest: IntArray) -> BoolArray:
@@ -221,83 +220,110 @@ class Stochastic(Component):
             self._minds[run] = self._minds[run]._replace(chosen=told)
         return sent
 
-    def _follow_level(self, mind: Mind, tick: int, highest: int) -> tuple[Mind, bool, bool]:
-        """Take in the highest level of an instant; return whether it chooses, and acts, at it."""
-        per_s = self.context.ticks_per_s
-        if highest < self.p.level:
-            called_off = mind._replace(since=None, chooses_at=None, acts_at=None, has_acted=False)
-            return called_off, False, False
-        since = tick if mind.since is None else mind.since
-        mind = mind._replace(since=since)
+    def _follow(
+        self, minds: list[Mind], ticks: IntArray, highest: Sequence[int]
+    ) -> tuple[list[int], list[int]]:
+        """Let minds, of a run each, take in the highest level of an instant; return which choose at
+        it, and which act.
+        """
+        per_s, at = self.context.ticks_per_s, ticks.tolist()
         early = self.p.chooses == "before_executing"
-        held = tick - since >= self.p.held_s * per_s
+        for k, mind in enumerate(minds):
+            if highest[k] < self.p.level:
+                minds[k] = mind._replace(since=None, chooses_at=None, acts_at=None, has_acted=False)
+            elif mind.since is None:
+                minds[k] = mind._replace(since=at[k])
+        deciding = [k for k, mind in enumerate(minds) if self._decides(mind, at[k])]
+        for k in deciding:
+            minds[k] = minds[k]._replace(decisions=minds[k].decisions + 1)
+        drawn = self._drawn(self._response, 3, [minds[k] for k in deciding], ticks[deciding])
+        for k, draws in zip(deciding, drawn, strict=True):
+            waits_s, executes_s = self._response_s(minds[k], highest[k], draws)
+            acts_at = at[k] + (waits_s + executes_s) * per_s
+            chooses_at = at[k] + waits_s * per_s if early else acts_at
+            minds[k] = minds[k]._replace(chooses_at=chooses_at, acts_at=acts_at)
+        choosing = [
+            k for k, mind in enumerate(minds)
+            if mind.chooses_at is not None and at[k] >= mind.chooses_at
+        ]  # fmt: skip
+        drawn = self._drawn(self._pause, 1, [minds[k] for k in choosing], ticks[choosing])
+        for k, draws in zip(choosing, drawn, strict=True):
+            wait_s = mean_pause_s(highest[k]) if draws is None else pause_s(highest[k], draws[0])
+            minds[k] = minds[k]._replace(chooses_at=None, free_from=at[k] + wait_s * per_s)
+        acting = [
+            k for k, mind in enumerate(minds)
+            if mind.chooses_at is None and mind.acts_at is not None and at[k] >= mind.acts_at
+        ]  # fmt: skip
+        for k in acting:
+            minds[k] = minds[k]._replace(acts_at=None, has_acted=True)
+        return choosing, acting
+
+    def _decides(self, mind: Mind, tick: int) -> bool:
+        """Tell whether a mind comes to a decision at an instant."""
+        if mind.since is None or mind.acts_at is not None:
+            return False
+        early = self.p.chooses == "before_executing"
         # A pause after a choice is over when it has passed, one after an act when it ends.
         free = tick > mind.free_from if early and mind.has_acted else tick >= mind.free_from
-        if mind.acts_at is None and held and free:
-            mind = mind._replace(decisions=mind.decisions + 1)
-            waits_s, executes_s = self._response_s(mind, highest, tick)
-            acts_at = tick + (waits_s + executes_s) * per_s
-            mind = mind._replace(
-                chooses_at=tick + waits_s * per_s if early else acts_at, acts_at=acts_at
-            )
-        chooses = mind.chooses_at is not None and tick >= mind.chooses_at
-        if chooses:
-            wait_s = mean_pause_s(highest)
-            if not self.p.deterministic:
-                wait_s = pause_s(highest, self._draw(mind, self._pause, 0, tick))
-            mind = mind._replace(chooses_at=None, free_from=tick + wait_s * per_s)
-        if mind.chooses_at is not None or mind.acts_at is None or tick < mind.acts_at:
-            return mind, chooses, False
-        return mind._replace(acts_at=None, has_acted=True), chooses, True
+        return free and tick - mind.since >= self.p.held_s * self.context.ticks_per_s
 
-    def _draw(self, mind: Mind, stream: Any, number: int, tick: int) -> float:
-        """Return the draw of a number, of the latest decision, made at a tick."""
-        instant_ns = nanosecond_of(np.array(tick, dtype=np.int64), self.context.ticks_per_s)
-        drawn = stream.of_runs(np.int64(mind.run), instant_ns)
-        return float(drawn.uniform(np.uint64(0), np.int64(mind.decisions), number))
+    def _drawn(
+        self, stream: Any, count: int, minds: Sequence[Mind], ticks: IntArray
+    ) -> list[list[float]] | list[None]:
+        """Return the first draws of the latest decision of each mind, made at ticks (minds,)."""
+        if self.p.deterministic or not minds:
+            return [None] * len(minds)
+        decisions = np.array([mind.decisions for mind in minds], dtype=np.int64)
+        runs = np.array([mind.run for mind in minds], dtype=np.int64)
+        drawn = stream.of_runs(runs, nanosecond_of(ticks, self.context.ticks_per_s))
+        zero = np.zeros(len(minds), dtype=np.uint64)
+        draws: list[list[float]] = np.stack(
+            [drawn.uniform(zero, decisions, number) for number in range(count)], axis=-1
+        ).tolist()
+        return draws
 
-    def _response_s(self, mind: Mind, highest: int, tick: int) -> tuple[float, float]:
+    def _response_s(
+        self, mind: Mind, highest: int, draws: Sequence[float] | None
+    ) -> tuple[float, float]:
         initial_s, coordination_s = self.p.initial_delay_s, self.p.coordination_s
         if mind.has_acted:
             initial_s = coordination_s = 0.0
         elif highest >= self.p.warning_level:
             coordination_s = 0.0
-        draws = None
-        if not self.p.deterministic:
-            draws = np.array([self._draw(mind, self._response, k, tick) for k in range(3)])
         return response_s(draws, initial_s, coordination_s, self.p.execution_delay_s)
 
     def _manoeuvres_at(
         self, alerts: AlertLevels, acting: Sequence[tuple[int, Mind]]
     ) -> dict[int, Manoeuvre]:
         """Return what operators who act at some rows of the alerts steer, by row."""
+        if not acting:
+            return {}
         by_turn: dict[int, bool] = {}
         draws: dict[int, Draws | None] = {}
-        for index, mind in acting:
+        minds, ticks = [mind for _, mind in acting], alerts.tick[[index for index, _ in acting]]
+        drawn = self._drawn(self._steering, 4, minds, ticks)
+        for (index, _), four in zip(acting, drawn, strict=True):
             by_turn[index], draws[index] = self.p.turn_share >= 0.5, None
-            if not self.p.deterministic:
-                tick = int(alerts.tick[index])
-                drawn = [self._draw(mind, self._steering, k, tick) for k in range(4)]
-                by_turn[index] = drawn[0] < self.p.turn_share
-                draws[index] = Draws(*drawn[1:])
+            if four is not None:
+                by_turn[index], draws[index] = four[0] < self.p.turn_share, Draws(*four[1:])
         result: dict[int, Manoeuvre] = {}
         needed: set[int] = set()
         # Who finds no way out by one kind tries the other.
         for first in (True, False) if 0.0 < self.p.turn_share < 1.0 else (True,):
-            for turns in (True, False):
+            for is_turn in (True, False):
                 rows = [
-                    n for n, it in by_turn.items() if n not in result and (it == turns) == first
+                    n for n, it in by_turn.items() if n not in result and (it == is_turn) == first
                 ]
                 if not rows:
                     continue
-                kind = "hdir" if turns else "alt"
+                kind = "hdir" if is_turn else "alt"
                 every = changes_out_of_bands(kind, self._configuration, self._alerter, alerts, rows)
                 for row, changes in zip(rows, every, strict=True):
                     change = 0.0
                     if changes is not None:
                         needed.add(row)
-                        change = steering(changes, turns, draws[row], self.p.goes_beyond)
-                    if change != 0.0 and turns:
+                        change = steering(changes, is_turn, draws[row], self.p.goes_beyond)
+                    if change != 0.0 and is_turn:
                         result[row] = self._turn(change, alerts, row)
                     elif change != 0.0:
                         result[row] = Manoeuvre(

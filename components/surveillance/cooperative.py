@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.known_targets import known_targets
-from components.atmosphere.pressure_altitude import STANDARD_HPA, pressure_altitude_m
+from components.atmosphere.pressure_altitude import pressure_altitude_m, scene_air
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.reach import Reach
 from components.sensor.look import Cells
@@ -97,11 +97,7 @@ class CooperativeSensor(Sensor):
     @cached_property
     def _air(self) -> dict[str, float]:
         """The atmosphere, where it is not the standard's."""
-        weather = self.context.sections.get("weather")
-        if weather is None:
-            return {}
-        air = {"qnh_hpa": weather.qnh_hpa, "offset_k": weather.temperature_offset_c}
-        return {} if air == {"qnh_hpa": STANDARD_HPA, "offset_k": 0.0} else air
+        return scene_air(self.context.sections.get("weather"))
 
     def altimeter_m(self, height_m: FloatArray) -> FloatArray:
         """Return what altimeters read at heights, but for their errors, m."""

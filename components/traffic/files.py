@@ -14,7 +14,12 @@ from components.formats.daa_file import read_daa
 from components.formats.recorded.traffic_of_files import TrafficChoice, read_traffic
 from components.formats.sample_columns import Altitude
 from components.formats.text_rows import TrafficFile
-from components.traffic.recorded import FileParameters, RecordedTraffic, RecordedTrafficParameters
+from components.traffic.recorded import (
+    FileHeights,
+    FileParameters,
+    RecordedTraffic,
+    RecordedTrafficParameters,
+)
 from components.traffic.scripted import Ownship, flight_of
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.files.input_files import is_folder, read_once
@@ -55,7 +60,15 @@ class Moved(Parameters):
     up_m: float = Field(default=0.0, description="Up, m.")
 
 
-class FileTrafficParameters(RecordedTrafficParameters):
+class Place(Parameters):
+    """Where something stands."""
+
+    lat_deg: float = Field(ge=-90, le=90, description="Latitude, deg.")
+    lon_deg: float = Field(ge=-360, le=360, description="Longitude, deg.")
+    alt_m: float = Field(default=0.0, description="Altitude, m.")
+
+
+class FileTrafficParameters(RecordedTrafficParameters, FileHeights):
     """Parameters of recorded traffic of any kind."""
 
     file: ScenePath | list[ScenePath] = Field(
@@ -70,6 +83,11 @@ class FileTrafficParameters(RecordedTrafficParameters):
         description="Which altitude is read, of a file with both. By default of tables the column "
         "that the list of names has first, else the barometric one; aircraft that report none of "
         "that kind fly at the other, as a note says.",
+    )
+    place: Place | None = Field(
+        default=None,
+        description="Where radars are whose plots are flown and that do not say it (ASTERIX 048), "
+        "and the origin of an .xyz file.",
     )
     own_file: ScenePath | None = Field(
         default=None,
@@ -136,8 +154,9 @@ class FileTrafficParameters(RecordedTrafficParameters):
     def choice(self) -> TrafficChoice:
         """Return what is taken of the files."""
         lowest, highest = self.lowest_m, self.highest_m
-        offset = self.own_moved
+        offset, place = self.own_moved, self.place
         return TrafficChoice(
+            place=None if place is None else (place.lat_deg, place.lon_deg, place.alt_m),
             ownship=self.ownship,
             altitude=self.altitude,
             own_file=self.own_file,
@@ -184,7 +203,7 @@ class FileTraffic(RecordedTraffic):
         return f"{first} and {len(others)} more" if others else str(first)
 
 
-class DaaFileParameters(FileParameters):
+class DaaFileParameters(FileParameters, FileHeights):
     """Parameters of a DAIDALUS traffic file."""
 
     reference_lat_deg: float = Field(

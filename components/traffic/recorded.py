@@ -1,15 +1,21 @@
 """What all recorded traffic has in common: flights of samples, and what is suspicious of them."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from components.aircraft.aircraft import OWNSHIP, Aircraft, Roster
 from components.aircraft.equipage import EquipageShares, with_shares
+from components.atmosphere.pressure_altitude import (
+    height_of_pressure_altitude_m,
+    pressure_altitude_m,
+    scene_air,
+)
 from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
 from components.flights.closest_approach import KnownTimes, SampleTimes
 from components.flights.fleet import Trajectory
@@ -20,7 +26,7 @@ from components.traffic.scripted import Ownship
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.component import ScenePath
+from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.errors import did_you_mean
 
 #: Beyond any aircraft: m/s along the path and upward, m/s², and metres above the ellipsoid.
@@ -155,6 +161,16 @@ class RecordedTrafficParameters(SourceParameters):
     )
 
 
+class FileHeights(Parameters):
+    """What altitudes of a file are."""
+
+    heights: Literal["geometric", "pressure"] = Field(
+        default="geometric",
+        description="What the file's altitudes are flown as: heights, or pressure altitudes, which "
+        "are put at the heights where the air of `[weather]` has these pressures.",
+    )
+
+
 class FileParameters(RecordedTrafficParameters):
     """Parameters of traffic in one file."""
 
@@ -172,7 +188,7 @@ class RecordedTraffic(TrafficSource):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        self.content = self._apply_wind(self.read())
+        self.content = self._in_air(self.read())
         self.own = self.own_flight()
         others = [craft for craft in self.content.aircraft if craft is not self.own]
         self.targets = SampledFleet(others)
@@ -200,15 +216,38 @@ class RecordedTraffic(TrafficSource):
         """Return the names of the files, for messages."""
         return str(self.p.file)
 
-    def _apply_wind(self, content: TrafficFile) -> TrafficFile:
-        """Return the flights with noses turned into the scene's wind, where there is one."""
-        wind = scene_wind(self.context.sections.get("weather"))
-        if wind is None:
+    def _in_air(self, content: TrafficFile) -> TrafficFile:
+        """Return the flights as they are in the scene's air.
+
+        Noses are turned into its wind, and pressure altitudes are put at their heights.
+        """
+        weather = self.context.sections.get("weather")
+        wind, air = scene_wind(weather), scene_air(weather)
+        at_pressures = bool(air) and getattr(self.p, "heights", "") == "pressure"
+        if wind is None and not at_pressures:
             return content
+        blows = (0.0, 0.0) if wind is None else (wind.east_mps, wind.north_mps)
         own, *intruders = (
-            craft.with_wind(wind.east_mps, wind.north_mps) for craft in content.aircraft
+            craft.in_air(
+                *blows,
+                height_of_pressure_altitude_m(craft.alt_m, **air) if at_pressures else None,
+            )
+            for craft in content.aircraft
         )
         return replace(content, ownship=own, intruders=intruders)
+
+    def _says_heights(self) -> list[str]:
+        """Say that a file's altitudes are pressure altitudes, in air that is not the standard's."""
+        air = scene_air(self.context.sections.get("weather"))
+        is_pressure = re.search("baro|pressure", self.content.height, re.IGNORECASE)
+        if not air or not is_pressure or getattr(self.p, "heights", "") != "geometric":
+            return []
+        off_m = float(pressure_altitude_m(1000.0, **air)) - 1000.0
+        return [
+            f"its altitudes ({self.content.height}) are pressure altitudes and are flown as "
+            f"heights, off by {off_m:+.0f} m at 1,000 m in the air of [weather]; heights = "
+            "'pressure' puts them where it has these pressures"
+        ]
 
     def read(self) -> TrafficFile:
         """Return the content of the file."""
@@ -238,7 +277,7 @@ class RecordedTraffic(TrafficSource):
         """Say what was left out, what no aircraft does, and which error of units it looks like."""
         duration_s = float(self.context.duration_s)
         lines = [
-            *self.content.warnings, *suspicions(self.content.aircraft),
+            *self.content.warnings, *self._says_heights(), *suspicions(self.content.aircraft),
             *_coverage(self.own, list(self.targets), duration_s),
         ]  # fmt: skip
         return [f"file {self.file_names()}: {line}" for line in lines]

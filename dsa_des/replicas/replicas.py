@@ -18,11 +18,12 @@ from dsa_des.replicas.lockstep import NotInLockStep, Replicas, lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
-#: Bytes that replicas which run together hold while they do, about.
-_MOST_BYTES = 150e6
-# What one holds: tracks and tables whatever it is, a flight's samples, what is made of a scan.
-# 59 to 165 kB were measured of five closed and open loops of 120 and 180 s, 360 to 3240 scans.
-_BYTES, _BYTES_PER_S, _BYTES_PER_SCAN = 40e3, 550.0, 25.0
+#: Bytes that replicas which run together hold while they do, about. A feedback loop goes through as
+#: many windows whatever they hold: with these they take an eighth of the processor's time.
+_MOST_BYTES = 360e6
+# What one holds: tracks and tables whatever it is, two flights' samples, what is made of a scan.
+# 25 to 84 kB were measured of four closed and open loops of 120 and 180 s, 360 to 3240 scans.
+_BYTES, _BYTES_PER_S, _BYTES_PER_SCAN = 25e3, 275.0, 25.0
 _A_LONG_RUN_S = 3600.0
 #: Which columns of which tables are recorded; None records everything.
 Wanted = Mapping[str, Collection[str]] | None

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from components.atmosphere.pressure_altitude import pressure_altitude_m
+from components.atmosphere.pressure_altitude import (
+    height_of_pressure_altitude_m,
+    pressure_altitude_m,
+)
 
 #: ICAO Doc 7488: geopotential altitude, m, and pressure, hPa.
 ICAO = [(0, 1013.25), (1000, 898.745), (3000, 701.085), (5000, 540.199), (8000, 355.998),
@@ -32,11 +35,14 @@ def test_an_altimeter_reads_the_standard_height_of_the_pressure_there(height_m, 
     altitude = float(pressure_altitude_m(height_m, qnh_hpa=qnh_hpa, offset_k=offset_k))
     there = pressure_hpa(height_m, qnh_hpa, offset_k)
     assert pressure_hpa(altitude, 1013.25, 0) == pytest.approx(there, rel=1e-8)
+    back_m = height_of_pressure_altitude_m(altitude, qnh_hpa=qnh_hpa, offset_k=offset_k)
+    assert back_m == pytest.approx(height_m, abs=1e-6)
 
 
 def test_the_standard_atmosphere_changes_no_bit():
     heights = np.array([0.1, 123.456, 7891.234, 14_000.7])
     assert (pressure_altitude_m(heights) == heights).all()
+    assert (height_of_pressure_altitude_m(heights) == heights).all()
 
 
 def test_arguments_are_named_where_they_are_wrong():

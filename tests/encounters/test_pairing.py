@@ -12,7 +12,7 @@ from components.encounters.pair_densities import (
     StepDensity,
     speeds_over_directions,
 )
-from components.encounters.pairing import Pairs, PairSampler
+from components.encounters.pairing import COURSES, Pairs, PairSampler, draw_courses
 from components.encounters.track_rules import TrackError
 from components.metrics.risk import risk_ratio
 from tests.encounters.reference_data import reference_file
@@ -277,3 +277,24 @@ def test_published_models_pair(tmp_path: Path) -> None:
     assert pairs.up_ft.min() >= 500 and pairs.up_ft.max() <= 18000
     shares = np.histogram(np.abs(pairs.horizontal_ft), [0, 500, 1500, 18240])[0] / 300
     assert shares == pytest.approx(np.array([1, 0.8, 2 / 3]) / (1 + 0.8 + 2 / 3), abs=0.1)
+
+
+def test_courses_are_those_whose_relative_speed_is_drawn():
+    """Two of 100 ft/s: at 36 deg 3,820 of at most 40,000 ft²/s²; at 90 deg 20,000."""
+    drawn = np.zeros((2 * COURSES, 4))
+    drawn[:6] = [
+        [0.1, 0.1, 0.1, 0.25],  # courses, in turns
+        [0.45, 0.3, 0.65, 0.5],  # their squares of the most: 8,100 is too much, 3,600 is not
+        [0.25, 0.4, 0.25, 0.4],
+        [0.72, 0.1, 0.69, 0.1],  # 20,736 is too much; of 60,000, climbing, 28,566 is not
+        [0.5, 0.5, 0.5, 0.5],
+        [0.9, 0.9, 0.9, 0.9],
+    ]
+    first, second = np.full((2, 4), 100.0)
+    climb = np.array([0.0, 0.0, 100.0 * 2**0.5, 0.0])
+    # The third has 3,820 + 20,000 there, of at most 60,000: 25,350 are asked.
+    turns = draw_courses(first, second, climb, drawn) / (2.0 * np.pi)
+    np.testing.assert_allclose(turns, [0.5, 0.1, 0.25, 0.25])
+    unlike = draw_courses(np.array([300.0]), np.array([100.0]), np.zeros(1), drawn[:, :1])
+    # (300² + 100² - 60,000 cos 36 deg) of 160,000: 51,459, of which 32,400 are asked.
+    assert unlike[0] / (2.0 * np.pi) == pytest.approx(0.1)

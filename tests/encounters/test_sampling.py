@@ -15,7 +15,7 @@ from tests.encounters.reference_data import reference_file
 
 #: One draw of chance below this would come once in 10,000 tests; seeds are fixed.
 UNLIKELY = 1e-4
-MODELS = ["small", "models/paramotor_v1.txt", "models/uncor_1200code_v1.txt"]
+MODELS = ["models/paramotor_v1.txt", "models/uncor_1200code_v1.txt"]
 
 
 def model_file(name: str, folder: Path) -> Path:
@@ -85,7 +85,7 @@ def test_values_are_uniform_in_their_bins_and_exactly_zero_around_zero(
 @pytest.mark.parametrize("name", MODELS)
 def test_every_second_follows_the_networks_columns(name: str, tmp_path: Path) -> None:
     path = model_file(name, tmp_path)
-    slow, tracks = sampled(path, 4000 if name == "small" else 1500, 30)
+    slow, tracks = sampled(path, 1500, 30)
     model = read_model(path)
     states = []
     for place in range(len(slow.labels)):
@@ -181,3 +181,16 @@ def test_a_track_is_the_same_alone_in_any_batch_and_as_part_of_a_longer_one(tmp_
     other = TrackSampler(model, EncounterDraws(4, "tracks")).sample([77_123], 40)
     assert not np.array_equal(alone.changing, again.changing)
     assert not np.array_equal(alone.changing, other.changing)
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        test_initial_states_follow_the_exact_marginals,
+        test_values_are_uniform_in_their_bins_and_exactly_zero_around_zero,
+        test_every_second_follows_the_networks_columns,
+        test_values_hold_unless_they_are_drawn_anew_at_their_rate,
+    ],
+)
+def test_a_small_model_of_our_own_is_sampled_as_well(check, tmp_path: Path) -> None:
+    check("small", tmp_path)

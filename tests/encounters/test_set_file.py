@@ -129,7 +129,10 @@ def test_a_flight_by_events_that_cannot_be_flown_is_named(
     with pytest.raises(EncounterSetError) as error:
         read_set(Path(events(tmp_path / "set.parquet", **changes)))
     assert said in str(error.value)
-    assert len(read_set(Path(events(tmp_path / "set.parquet")))) == 2
+    # What lies at a limit can be flown.
+    limits = {"speed_mps": [50.0, 1e-3, 0.5, 2000.0], "duration_s": [0.05, 86_400.0, 20.0, 20.0],
+              "heading_rad": [1e4, -1e4, 1.0, 0.0]}  # fmt: skip
+    assert len(read_set(Path(events(tmp_path / "set.parquet", **limits)))) == 2
 
 
 def test_weights_are_worth_their_effective_sample_size(tmp_path: Path) -> None:

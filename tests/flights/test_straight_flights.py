@@ -6,6 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from components.flights.geodesic_motion import geodesic_parameters
+from components.flights.leg_motion import turn_parameters
+from components.flights.legs import Straight, Turn, fly_each
 from components.flights.many_flights import straight_fleet
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 
@@ -98,3 +100,41 @@ def test_what_one_flight_refuses_is_refused_of_many(changes, said):
 def test_flights_that_stand_still_are_made_one_by_one():
     still = plain(speed_mps=0.0)
     assert [flight.segments[0].kind for flight in still] == ["hold"] * 2
+
+
+def legs_of(number):
+    """Of all kinds, and as many as the number tells; some last no time, some stand still."""
+    between = [
+        Turn.model_construct(duration_s=7.5, speed_mps=40.0, climb_mps=1.0, rate_deg_s=-3.0),
+        Straight.model_construct(duration_s=3.1, speed_mps=0.0, climb_mps=-2.0),
+        Turn.model_construct(duration_s=2.0, speed_mps=0.0, climb_mps=0.0, rate_deg_s=5.0),
+        Straight.model_construct(duration_s=0.0, speed_mps=30.0, climb_mps=0.0),
+        Straight.model_construct(duration_s=11.0, speed_mps=60.0, climb_mps=4.0),
+    ]  # fmt: skip
+    last = Straight.model_construct(duration_s=None, speed_mps=35.0 + number, climb_mps=0.5)
+    return [*between[number % 2 : number], last]
+
+
+def test_turns_and_scripts_that_are_flown_together_have_the_bits_of_each_alone():
+    rng = np.random.default_rng(5)
+    lat, lon, alt, heading = rng.uniform(
+        [[-90], [-180], [0], [0]], [[90], [180], [9e3], [6]], (4, 12)
+    )
+    lat[:3] = 90.0, -90.0, 0.0
+    motion = rng.uniform(5, 90, 12), rng.normal(0, 3, 12), rng.uniform(0.02, 0.2, 12)
+    motion[2][::2] *= -1.0
+    columns = lat, lon, alt, heading, *motion
+    alone = [turn_parameters(*row) for row in zip(*(of.tolist() for of in columns), strict=True)]
+    assert turn_parameters(*columns).tobytes() == np.stack(alone, axis=1).tobytes()
+    legs = [legs_of(number % 6) for number in range(12)]
+    together = fly_each((lat, lon, alt), np.radians(np.degrees(heading) % 360.0), legs)
+    for k, segments in enumerate(together):
+        flight = ScriptedTrajectory(
+            "a", lat_deg=lat[k], lon_deg=lon[k], alt_m=alt[k], speed_mps=1.0,
+            heading_deg=float(np.degrees(heading[k])), legs=legs[k],
+        )  # fmt: skip
+        assert len(segments) == len(flight.segments)
+        for one, other in zip(segments, flight.segments, strict=True):
+            assert one.parameters.tobytes() == other.parameters.tobytes()
+            for name in ("kind", "start_s", "pitch_rad", "roll_rad", "speed_mps"):
+                assert getattr(one, name) == getattr(other, name)

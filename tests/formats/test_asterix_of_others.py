@@ -11,7 +11,9 @@ from covering import covers
 
 import dsa_des
 from components.formats.asterix_file import read_asterix_plots
+from components.formats.recorded.traffic_of_files import TrafficChoice, read_traffic
 from components.formats.text_rows import TrafficFileError
+from dsa_des.running.simulation import Simulation
 
 pytest.importorskip("asterix", reason="needs the extra asterix")
 
@@ -110,12 +112,15 @@ def test_a_scene_says_which_altitude_is_flown(tmp_path, key, feet):
     assert own["alt_m"] == pytest.approx(feet * FOOT_M)
 
 
-def plot(time_s, range_nmi, azimuth_deg, level=None):
-    """A record of 048: items 010, 140, 020, 040, and 090 where there is a level."""
-    record = bytes([0xF4 if level is not None else 0xF0, 25, 12])
+def plot(time_s, range_nmi, azimuth_deg, level=None, code=None, address=None, radar=12):
+    """A record of 048: items 010, 140, 020, 040, and 070, 090 and 220 where they are given."""
+    head = 0xF0 | 0x08 * (code is not None) | 0x04 * (level is not None)
+    record = bytes([head] if address is None else [head | 1, 0x80]) + bytes([25, radar])
     record += int(time_s * 128).to_bytes(3, "big") + b"\xa0"
     record += struct.pack(">HH", round(range_nmi * 256), round(azimuth_deg * 65536 / 360))
-    return block(48, record + (b"" if level is None else struct.pack(">H", level * 4)))
+    for number in (code, None if level is None else level * 4):
+        record += b"" if number is None else struct.pack(">H", number)
+    return block(48, record + (b"" if address is None else address.to_bytes(3, "big")))
 
 
 def north(time_s, place=None):
@@ -178,6 +183,45 @@ def test_a_radar_that_says_no_place_is_put_where_the_scene_says(tmp_path):
         one, other = put.detections[name].to_numpy(), said.detections[name].to_numpy()
         assert one == pytest.approx(other, abs=1e-7) and len(one) == 4
     assert {round(x, 6) for x in put.scans["own_lat_deg"].to_pylist()} == {lat}
+
+
+@covers("place", of=("traffic.file", "traffic.csv", "traffic.asterix"))
+def test_plots_that_say_whose_they_are_are_flown(tmp_path):
+    """By address, else by code; those of a second radar, and primary ones, are left out."""
+    path = tmp_path / "p.ast"
+    plots = b"".join(
+        plot(100 + 4 * k, 30 - 0.1 * k, 200, 300, address=0x4B1805)
+        + plot(101 + 4 * k, 10, 90 + k, 100, code=0o4521) + plot(101 + 4 * k, 7, 10)
+        + plot(102 + 4 * k, 50, 20, 300, address=0x4B1805, radar=13)
+        for k in range(4)
+    )  # fmt: skip
+    path.write_bytes(plots)
+    with pytest.raises(TrafficFileError, match=r"radar 25/12.* place = \{ lat_deg, lon_deg, alt_m"):
+        read_traffic([path], TrafficChoice())
+    placed = read_traffic([path], TrafficChoice(place=PLACE))
+    path.write_bytes(plots + north(100, PLACE))
+    lat, lon, alt = PLACE
+    traffic = {"type": "traffic.file", "file": str(path),
+               "place": {"lat_deg": 0, "lon_deg": 0, "alt_m": 0}}  # fmt: skip
+    tables = {"extends": "detect_and_sense", "blocks": {"traffic": traffic}}
+    said = Simulation(dsa_des.load_scene(tables)).components["traffic"].content
+    for file in (placed, said):
+        assert [one.name for one in file.aircraft] == ["4B1805", "A4521"]
+        assert file.warnings == [
+            "8 plots are left out that do not say whose they are or how high, or are of aircraft "
+            "that another radar sees"
+        ]
+        for craft, far_nmi, turned, high_ft in ((file.ownship, 29.9, 200, 30_000),
+                                                (file.intruders[0], 10, 91, 10_000)):  # fmt: skip
+            assert craft.sample_times_s[1] - craft.sample_times_s[0] == 4.0
+            at = craft.lat_deg[1], craft.lon_deg[1], craft.alt_m[1]
+            azimuth, _, range_m = pymap3d.geodetic2aer(*at, lat, lon, alt)
+            assert range_m == pytest.approx(far_nmi * NMI_M, abs=3)
+            assert azimuth == pytest.approx(turned, abs=0.006)
+            assert at[2] == pytest.approx(high_ft * FOOT_M)
+    path.write_bytes(b"".join(plot(100 + k, 7, 10) for k in range(3)))
+    with pytest.raises(TrafficFileError, match=r"none of its 3 plots .* says whose it is"):
+        read_traffic([path], TrafficChoice(place=PLACE))
 
 
 def test_plots_without_a_height_are_left_out_and_counted(tmp_path):

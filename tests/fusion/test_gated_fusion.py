@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from components.fusion.gated import Entries, Gates, nearest_in_gate
+from components.fusion.gated import Entries, Gates, carried, nearest_in_gate
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -58,6 +58,63 @@ def test_gates_of_place():
     assert match(report([0.0], [1000]), [0], report([0.0], [1150]), [0]) == [-1]
     assert match(report([0.0], [1000]), [0], report([0.0], [1050]), [0]) == [0]
     assert match(report([0.0], [1000]), [0], report([0.0]), [0]) == [0]  # no range: gate open
+
+
+def entry(azimuth_deg, range_m, made, came, pose, rate_mps=np.nan):
+    message = report([azimuth_deg], [range_m])
+    message.range_rate_m_s = np.array([rate_mps])
+    return Entries(message, *(np.array([n]) for n in (0, made, came)), np.array(pose)[:, None])
+
+
+def test_who_came_too_long_ago_is_not_gathered_though_measured_in_time():
+    still = np.full(6, np.nan)
+    one = entry(0.0, 1000.0, 100, 100, still)
+    for came, wanted in ((100, 0), (95, 0), (94, -1), (101, -1)):
+        other = entry(0.0, 1100.0, 90, came, still)
+        gates = Gates(10, 5, np.radians(2.0), 100.0, 5)
+        assert nearest_in_gate(one, np.array([0]), other, gates).tolist() == [wanted]
+    far = entry(0.0, 1100.5, 90, 100, still)
+    assert nearest_in_gate(one, np.array([0]), far, gates).tolist() == [-1]
+
+
+def test_what_was_measured_earlier_is_carried_by_how_the_ownship_moved():
+    """Two seconds earlier, at the equator, where 100 m north are so many degrees."""
+    north_deg = np.degrees(100.0 / 6_335_439.327)
+    before, turned = np.zeros(6), np.array([0.0, 0.0, 0.0, np.radians(10.0), 0.0, 0.0])
+    moved = np.array([north_deg, 0.0, 0.0, 0.0, 0.0, 0.0])
+    for azimuth_deg, range_m, after, rate_mps, wanted in (
+        (30.0, 1000.0, turned, np.nan, (20.0, 1000.0)),
+        (30.0, 1000.0, turned, -50.0, (20.0, 900.0)),
+        (0.0, 1000.0, moved, np.nan, (0.0, 900.0)),
+        (90.0, 1000.0, moved, np.nan, (90.0 + np.degrees(np.arctan(0.1)), np.hypot(1000.0, 100.0))),
+        (
+            90.0,
+            np.nan,
+            moved,
+            np.nan,
+            (90.0 + np.degrees(np.arctan(0.05)), np.nan),
+        ),  # as far as one
+        (30.0, 1000.0, np.full(6, np.nan), -50.0, (30.0, 1000.0)),
+    ):
+        one = entry(0.0, 2000.0, 110, 110, after)
+        other = entry(azimuth_deg, range_m, 100, 100, before, rate_mps)
+        azimuth, elevation, found_m = carried(one, np.zeros(1, int), other, np.zeros(1, int), 5)
+        np.testing.assert_allclose(
+            [np.degrees(azimuth[0]), found_m[0]], wanted, rtol=1e-6, atol=1e-6
+        )
+        assert abs(elevation[0]) < 1e-5
+    same = carried(
+        one, np.zeros(1, int), entry(30.0, 7.0, 110, 110, before, 9.0), np.zeros(1, int), 5
+    )
+    assert [part.tolist() for part in same] == [[np.radians(30.0)], [0.0], [7.0]]
+
+
+def test_detections_are_kept_as_long_as_others_may_come_late():
+    latency = ["blocks.radar.latency_s=0.35", "blocks.fusion.time_gate_s=0.2"]
+    simulation = Simulation(load_scene(SCENE, swaps=SWAP, sets=latency))
+    fusion = simulation.components["fusion"]
+    per_s = fusion.context.ticks_per_s
+    assert (fusion.gate_ticks, fusion.keep_ticks) == (0.2 * per_s, 0.55 * per_s)
 
 
 def tables(window=None, shuffle=None, duration_s=90, **options):

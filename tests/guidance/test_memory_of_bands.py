@@ -45,6 +45,48 @@ def test_two_of_three_lines_make_a_band():
     assert shown(BandMemory(VALUES, cyclic=False), red(2, 5), FREE)[0] == red(2, 5)
 
 
+@pytest.mark.parametrize(
+    ("values", "wanted"),
+    [
+        ({"alerting_m": 3, "alerting_n": 3}, [FREE, FREE, FREE, red(2, 5)]),
+        ({"alerting_m": 1, "alerting_n": 3}, [FREE, red(2, 5), red(2, 5), red(2, 5)]),
+        # No rule, or one that cannot be: each line counts.
+        ({"alerting_m": 0}, [FREE, red(2, 5), red(2, 5), red(2, 5)]),
+        ({"alerting_m": 4}, [FREE, red(2, 5), red(2, 5), red(2, 5)]),
+        ({"hysteresis_time": 0.0}, [FREE, red(2, 5), red(2, 5), red(2, 5)]),
+    ],
+)
+def test_so_many_of_the_last_lines_make_a_band(values, wanted):
+    memory = BandMemory({**VALUES, **values}, cyclic=False)
+    assert shown(memory, FREE, red(2, 5), red(2, 5), red(2, 5)) == wanted
+
+
+@pytest.mark.parametrize(
+    ("values", "stays"),
+    [({}, True), ({"persistence_time": 0.0}, False), ({"bands_persistence": False}, False),
+     ({"hysteresis_time": 0.0}, False)],
+)  # fmt: skip
+def test_a_band_persists_where_all_three_keys_say_so(values, stays):
+    asked = {**VALUES, "alerting_m": 0, "bands_persistence": True, **values}
+    found = shown(BandMemory(asked, cyclic=False), red(-2, 5), FREE)
+    assert found == [red(-2, 5), red(-2, 5) if stays else FREE]
+
+
+def test_lines_are_remembered_up_to_the_time_itself():
+    for later_s, wanted in ((5.0, FREE), (5.1, red(2, 5)), (-1.0, red(2, 5))):
+        memory = BandMemory(VALUES, cyclic=False)
+        memory.step(10.0, FREE, 0.0, None)
+        assert memory.step(10.0 + later_s, red(2, 5), 0.0, None) == wanted
+
+
+def test_a_way_out_counts_where_there_is_time_for_one():
+    line = [Band(-10.0, 4.0, "NEAR"), Band(4.0, 10.0, "NONE")]
+    for time_s, region in ((4.0, "RECOVERY"), (0.0, "RECOVERY"), (-1.0, "NONE")):
+        memory = BandMemory({**VALUES, "alerting_m": 1}, cyclic=False)
+        found = memory.step(0.0, line, 0.0, OUT._replace(time_s=time_s))
+        assert found == [line[0], Band(4.0, 10.0, region)]
+
+
 def test_overlapping_lines_count_place_by_place():
     memory = BandMemory(VALUES, cyclic=False)
     found = shown(memory, FREE, red(1, 5), red(3, 7, "NEAR"))
@@ -103,6 +145,32 @@ def test_the_preferred_side_changes_late():
         found = Resolution(float(low), float(high), high <= -low)
         sides.append(memory.step(float(now_s), found, red(low, high), 0.0, None).prefers_high)
     assert sides == [True, True, False]
+
+
+def test_a_side_without_a_way_is_not_preferred():
+    memory = ResolutionMemory(VALUES, "vs")
+    nan, sides = math.nan, []
+    ways = [(-4, 3), (-4, nan), (nan, 3), (-4, nan), (nan, nan), (-4, 3), (-3, 4)]
+    for now_s, (low, high) in enumerate(ways):
+        found = Resolution(float(low), float(high), False)
+        sides.append(memory.step(float(now_s), found, red(-4, 3), 0.0, None).prefers_high)
+    assert sides == [True, False, True, False, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("recovery", "wanted"),
+    # The way up was found with a larger cylinder: it stays, and stays preferred.
+    [(None, (-1.0, 3.0, False)), (OUT, (-1.0, 5.0, True))],
+)
+def test_what_a_smaller_cylinder_gave_is_not_preferred(recovery, wanted):
+    """After 3.5 s the way down is nearer by the 2 m/s that count."""
+    memory = ResolutionMemory(VALUES, "vs")
+    bands = [Band(-10.0, -5.0, "NONE"), Band(-5.0, -3.0, "MID"), Band(-3.0, -1.0, "NONE"),
+             Band(-1.0, 3.0, "MID"), Band(3.0, 10.0, "NONE")]  # fmt: skip
+    first = memory.step(0.0, Resolution(-6.0, 5.0, True), red(-6, 5), 0.0, None)
+    assert first == (-6.0, 5.0, True)
+    later = memory.step(3.5, Resolution(-1.0, 3.0, False), bands, 0.0, recovery)
+    assert later == wanted
 
 
 @pytest.fixture(scope="module")

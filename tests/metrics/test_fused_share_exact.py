@@ -109,6 +109,12 @@ def test_the_formula_counts_a_whole_beat(pair: tuple[str, ...]) -> None:
         assert share == Fraction(partners(own, other, before, after), len(own))
 
 
+def test_beats_of_clocks_that_begin_apart_are_counted() -> None:
+    for pair in (("5", "3", "1/30", "0", "1/15"), ("7", "3", "0", "1/42", "1/50"),
+                 ("20", "2", "1/20", "1/10", "0"), ("5", "2", "0", "3/100", "1/25")):  # fmt: skip
+        test_the_formula_counts_a_whole_beat(pair)
+
+
 def test_a_scan_waits_for_a_partner_no_longer_than_to_the_next(small: Path) -> None:
     """Of ten scans that with the other sensor's and the one after; not the one before."""
     metric = MetricSpec("fused_share").build(scene := scene_of_pair(

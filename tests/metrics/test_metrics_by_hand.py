@@ -29,7 +29,7 @@ from dsa_des.studies.study import MetricSpec
 WELL_CLEAR_M, NMAC_M = (
     (PRESETS[name].horizontal_m, PRESETS[name].vertical_m) for name in ("astm_f3442", "nmac")
 )
-KINDS = {"block": str, "target": str, "sensors": str}
+KINDS = {"block": str, "target": str, "sensors": str, "updated_by": str}
 
 
 def table(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -59,6 +59,17 @@ def fused(time_s: float, sensors: str, target: str = "one") -> dict[str, Any]:
             "true_range_m": 1000 - time_s}  # fmt: skip
 
 
+def scans(block: str, period_s: float, looks: Sequence[int]) -> list[dict[str, Any]]:
+    return [{"block": block, "time_s": period_s * k, "evaluated": n} for k, n in enumerate(looks)]
+
+
+def track(time_s: float, measured_s: float, sensor: str = "radar") -> dict[str, Any]:
+    return {"block": "tracker", "target": "one", "time_s": time_s, "measured_s": measured_s,
+            "updated_by": sensor, "age_s": time_s - measured_s}  # fmt: skip
+
+
+#: Four runs of 6 s: one with much in it, one of a single detection, one without any, and one whose
+#: first scan sees somebody.
 RUNS: list[dict[str, Any]] = [
     {
         "detections": table(
@@ -67,9 +78,100 @@ RUNS: list[dict[str, Any]] = [
              look(1.2, 6, 800), look(1.4, 7, 780), look(1.5, 3, 770, block="ir")]
         ),
         "fused": table([fused(0.2, "radar"), fused(0.4, "radar"), fused(1.4, "radar+ir")]),
+        "scans": table([*scans("radar", 0.2, [0, 2, 2, 0, 0, 0, 2, 2]),
+                        *scans("ir", 0.5, [1, 1, 1, 1])]),
+        # Nothing new at 0.6 s, and another sensor's measurement of the same instant at 3.7 s.
+        "tracks": table([track(0.2, 0.2), track(0.4, 0.4), track(0.6, 0.4), track(3.4, 3.4),
+                         track(3.7, 3.4, "ir")]),
     },
-    {"detections": table([look(3.0, 15, 700)]), "fused": table([fused(3.0, "radar")])},
+    {
+        "detections": table([look(3.0, 15, 700)]), "fused": table([fused(3.0, "radar")]),
+        "scans": table([*scans("radar", 0.2, [1] * 16), *scans("ir", 0.5, [0] * 7)]),
+        "tracks": table([track(3.0, 3.0)]),
+    },
+    {},
+    {
+        "detections": table([look(0.0, 0, 950), look(0.2, 1, 940)]),
+        "fused": table([fused(0.0, "radar"), fused(2.0, "radar")]),
+        "scans": table([*scans("radar", 0.2, [1, 1, 0]), *scans("ir", 0.5, [0, 0])]),
+    },
 ]  # fmt: skip
+NAN = math.nan
+FIRST, RULE = "first_detection_", {"m": 2, "n": 2, "sensors": ["radar"]}
+MEASURED: list[tuple[str, dict[str, Any], dict[str, list[Any]]]] = [
+    ("first_detection", {}, {
+        "detected.ir": [1, 0, 0, 0], f"{FIRST}time_s.ir": [1.5, NAN, NAN, NAN],
+        f"{FIRST}range_m.ir": [770, NAN, NAN, NAN],
+        f"{FIRST}cut_off.ir": [None, "never", "never", "never"],
+        "detected.radar": [1, 1, 0, 1], f"{FIRST}time_s.radar": [0.2, 3, NAN, 0],
+        f"{FIRST}range_m.radar": [900, 700, NAN, 950],
+        f"{FIRST}cut_off.radar": [None, None, "never", "at the start"],
+        "detected.fused": [1, 1, 0, 1], f"{FIRST}time_s.fused": [0.2, 3, NAN, 0],
+        f"{FIRST}range_m.fused": [999.8, 997, NAN, 1000],
+        f"{FIRST}cut_off.fused": [None, None, "never", "at the start"],
+    }),
+    ("first_detection", {"target": "two", "sensors": ["radar"]}, {
+        "detected.radar": [1, 0, 0, 0], f"{FIRST}time_s.radar": [0.4, NAN, NAN, NAN],
+        f"{FIRST}range_m.radar": [500, NAN, NAN, NAN],
+        f"{FIRST}cut_off.radar": [None, "never", "never", "never"],
+    }),
+    ("detection_share", {}, {
+        "detection_share.ir": [0.25, NAN, NAN, NAN], "detection_share.ir.trials": [4, 0, 0, 0],
+        "detection_share.radar": [5 / 8, 1 / 16, NAN, 1],
+        "detection_share.radar.trials": [8, 16, 0, 2],
+    }),
+    ("declaration", RULE, {
+        f"{what}.{name}": values for name in ("radar", "any") for what, values in {
+            "declared": [1, 0, 0, 1], "declaration_time_s": [0.4, NAN, NAN, 0.2],
+            "declaration_range_m": [880, NAN, NAN, 940],
+            "declaration_delay_s": [0.2, NAN, NAN, 0.2],
+            "declaration_cut_off": [None, "never", "never", "at the start"],
+        }.items()
+    }),
+    # The camera's detection comes after the fused row; of the radar's one of five is in it.
+    ("fused_share", {}, {
+        "fused_share.ir_with_radar": [0, NAN, NAN, NAN],
+        "fused_share.ir_with_radar.trials": [1, 0, 0, 0],
+        "fused_share.radar_with_ir": [1 / 5, 0, NAN, 0],
+        "fused_share.radar_with_ir.trials": [5, 1, 0, 2],
+    }),
+    # Ages rise to 0.2 in 0.2 s and to 1 in 1 s; for 5 % of 1.2 s they are above 0.94 s.
+    ("age_of_information", {}, {
+        "age_of_information_mean_s": [(0.02 + 0.5) / 1.2, NAN, NAN, 1],
+        "age_of_information_p95_s": [0.94, NAN, NAN, 1.9],
+    }),
+    # Updates 0.2, 3 and 0.3 s apart: 1 s of 3.5 s is more than 2 s after one.
+    ("track_updates", {}, {
+        "track_update_interval_s": [3.5 / 3, NAN, NAN, NAN],
+        "track_update_interval_p95_s": [3, NAN, NAN, NAN],
+        "track_continuity": [1 - 1 / 3.5, NAN, NAN, NAN], "track_breaks": [1, 0, NAN, NAN],
+    }),
+    ("track_updates", {"break_after_s": 0.25}, {
+        "track_update_interval_s": [3.5 / 3, NAN, NAN, NAN],
+        "track_update_interval_p95_s": [3, NAN, NAN, NAN],
+        "track_continuity": [1 - 2.8 / 3.5, NAN, NAN, NAN], "track_breaks": [2, 0, NAN, NAN],
+    }),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "keys", "wanted"), MEASURED)
+def test_what_is_measured_of_recorded_rows_is_as_by_hand(
+    small: Path, name: str, keys: dict[str, Any], wanted: dict[str, list[Any]]
+) -> None:
+    scene = load_scene("small.toml")
+    metric = MetricSpec(name, keys).build(scene)
+    runs: list[Any] = [
+        SimpleNamespace(duration_s=6.0, ended_early=False, shared=None, number=k, tables=tables)
+        for k, tables in enumerate(RUNS)
+    ]
+    replicas = [Replica(k) for k in range(len(runs))]
+    found = metric.measure(Group(scene, replicas, runs, columns_wanted([metric])))
+    assert found.keys() == wanted.keys()
+    for key, values in wanted.items():
+        if found[key].dtype == object:
+            assert found[key].tolist() == values, key
+        else:
+            np.testing.assert_allclose(found[key], np.array(values, dtype=float), err_msg=key)
 
 
 def test_flights_together_are_as_each_alone(small: Path) -> None:

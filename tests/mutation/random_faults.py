@@ -7,8 +7,8 @@ A line is drawn first, all alike, of all rooms of `dsa_des` and `components`; th
 that this line allows (a constant, a comparison, a sign, swapped arguments, a dropped term, one off,
 and for or, ...), then one of these. It is put into a copy of the project. The tests of its room run
 first, then those of rooms that import it, then all others that execute the line, the cheapest files
-first (`tests/run_nearest.py` knows the order), until one fails or their time (`--budget-s`) is used
-up; what does not end counts as noticed.
+first (`tests/run_nearest.py` knows the order), until one fails or their processor time
+(`--budget-s`) is used up; what does not end counts as noticed.
 
 Which tests execute a line is known from a map that `coverage_map.py` makes once (half an hour; of
 the fast tier, with -m "not slow", a few minutes; a map of an older state still serves, as do the
@@ -118,12 +118,13 @@ class Tests:
         return bool(found - self._left_out) and file not in self._left_out
 
     def _seconds(self, test: str) -> float:
-        return self._known.seconds[test]
+        """Return the processor time of a test: how busy the machine was counts for nothing."""
+        return self._known.cpu_s.get(test, self._known.seconds[test])
 
     def _start(self, folder: Path, files: Sequence[str], tests: Sequence[str]) -> TestRun:
         there = [file for file in files if (folder / file).exists()]
-        limit_s = 120.0 + 5.0 * sum(map(self._seconds, tests))
-        chosen = Chosen(files, tests, self._known.seconds)
+        limit_s = 120.0 + 5.0 * sum(self._known.seconds[test] for test in tests)
+        chosen = Chosen(files, tests, {test: self._seconds(test) for test in self._known.seconds})
         options = ["-x", *(["-m", self._tier] if self._tier else [])]
         return TestRun(folder, there, *options, limit_s=limit_s, plugins=[chosen])
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from covering import covers
+from same_runs import replicas_of, same_as_alone
 from scipy import stats
 from test_avoidance_by_bands import scene as by_bands
 from wired import rows, run
@@ -79,12 +80,12 @@ def test_it_turns_or_climbs_at_its_rates(tmp_path):
 
 
 @covers("deterministic", of=KIND)
-def test_drawn_pilots_differ_and_each_is_the_same_again(tmp_path):
-    drawn = [
-        first(tmp_path, seed=seed, deterministic=False, coordination_s=0.0) for seed in (1, 2, 2)
-    ]
-    assert drawn[1] == drawn[2] != drawn[0]
+def test_drawn_pilots_differ_and_each_is_the_same_beside_the_others(tmp_path):
+    drawn = [first(tmp_path, seed=seed, deterministic=False, coordination_s=0.0) for seed in (1, 2)]
+    assert drawn[0] != drawn[1]
     assert all(told["time_s"] - began >= 4.0 for began, told in drawn)
+    every = scene(tmp_path, deterministic=False, turn_share=0.5, coordination_s=0.0)
+    same_as_alone(replicas_of(load_scene({**every, "duration_s": 32}), {}, {}))
 
 
 def test_what_is_drawn_is_by_the_decision_not_by_how_often_an_alert_was_seen(tmp_path):

@@ -98,6 +98,16 @@ def test_each_replica_s_targets_are_compared_with_their_own_look_before():
         np.testing.assert_allclose(together(cells), wanted, rtol=1e-12)
 
 
+def test_a_signature_weighs_size_by_contrast_and_adds_speed():
+    assert total_signature(10.0) == pytest.approx(3.0)
+    assert total_signature(10.0, 0.5) == pytest.approx(3.0)
+    weights = {"contrast_gain": 2.0, "static_weight": 0.5, "dynamic_weight": 3.0}
+    found = total_signature([10.0, 1.0], [0.5, 0.1], **weights)
+    assert found == pytest.approx([0.5 * 2.0 * 10.0 + 3.0 * 0.5, 1.0 + 0.3])
+    assert confidence([3.0, 0.5]) == pytest.approx([2.0, -0.5])
+    assert confidence(3.0, 2.5) == pytest.approx(0.5)
+
+
 def test_detection_range_at_its_ends():
     assert detection_range(12.0, **PIXEL, dynamic_signature=1.0) == np.inf
     assert detection_range(12.0, **PIXEL, threshold=-1.0) == np.inf

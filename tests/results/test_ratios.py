@@ -1,12 +1,14 @@
 """Ratios of events in summaries: by hand, clustered, by class, compared, and how often right."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow as pa
 import pytest
 
 from components.metrics.risk import risk_ratios_by_class
+from dsa_des.results.printing import gain_text
 from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio
 from dsa_des.results.record import CLASS, EVENT, NUMBER, RATIO, RatioOf, Result
 from dsa_des.results.rows import Rows
@@ -221,3 +223,18 @@ def test_events_of_two_conditions_have_a_weighted_ratio() -> None:
     assert plain.ratio is not None and plain.ratio.ratio == 1.0
     (number,) = compare_axis(rows, "x", 0.0, [FLAGS[2]], 0.95, "t")
     assert number.ratio is None
+
+
+@pytest.mark.parametrize(
+    ("gain", "reason", "more"),
+    [
+        (2.345, "", "; as wide an interval costs 2.3 times as much with all of them"),
+        (1.0, "", "; as wide an interval costs no more with all of them: nothing is gained"),
+        (0.4, "", "; as wide an interval costs no more with all of them: nothing is gained"),
+        (0.0, "", ""), (math.nan, "", ""), (2.0, "too few", ""),
+    ],
+)  # fmt: skip
+def test_what_a_choice_of_runs_gained_is_said_in_a_sentence(gain, reason, more) -> None:
+    ratio = SimpleNamespace(flown=1200, encounters=34_000, gain=gain, reason=reason)
+    line = SimpleNamespace(ratio=ratio, at=[2.5, "ekf"], result=SimpleNamespace(name="risk"))
+    assert gain_text(line) == f"2.5: ekf: risk: 1,200 of 34,000 runs were flown{more}"

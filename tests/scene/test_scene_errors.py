@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dsa_des.errors import SceneError
+from dsa_des.errors import Problem, SceneError
 from dsa_des.scene.scene import load_scene
 
 MODULE = Path(__file__).parents[1] / "support" / "engine_blocks.py"
@@ -455,3 +455,11 @@ def test_the_resolved_scene_is_the_same_scene(lab):
     assert to_toml(again.resolved()) == text
     assert tomllib.loads(text)["blocks"]["a"]["scan_rate_hz"] == "30000/1001"
     assert lab.run(lab.folder / "again.toml").tables == lab.run(lab.folder / "scene.toml").tables
+
+
+def test_of_many_problems_twenty_are_listed_and_the_others_counted():
+    for count, more in ((2, []), (20, []), (21, ["  and 1 more"]), (30, ["  and 10 more"])):
+        problems = [Problem("a.toml", f"key{k}", "must be above 0", -k) for k in range(count)]
+        listed = [f"  a.toml: key{k} = {-k}: must be above 0" for k in range(min(count, 20))]
+        assert str(SceneError(problems)).split("\n") == [f"{count} problems:", *listed, *more]
+    assert str(SceneError(problems[1:2])) == "a.toml: key1 = -1: must be above 0"

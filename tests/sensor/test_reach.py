@@ -8,7 +8,7 @@ import pytest
 from covering import SENSORS, covers
 from wired import alone, rows
 
-from components.messages.reach import Reach
+from components.messages.reach import ABSENT, Decision, Reach
 
 ROLLING, DIVING = (crooked.body(target) for target in crooked.TARGETS)
 RANGES_KM = [float(np.linalg.norm(vector)) / 1000 for vector in (ROLLING, DIVING)]
@@ -148,3 +148,25 @@ def test_width_of_a_field_runs_clockwise(azimuth_deg, width_deg):
     across, upward = reach.width_rad
     assert across == pytest.approx(np.radians(width_deg), rel=1e-15) and across <= 2 * np.pi
     assert upward == 0.75
+
+
+def test_decisions_of_rows_are_taken_widened_and_joined_by_hand():
+    """A sensor that scans at rows 0, 2 and 3 of five, with two targets."""
+    reason = np.array([[1, 2], [3, 4], [5, 6]], dtype=np.uint8)
+    whole = Decision(np.array([0, 2, 3]), reason, 5)
+    for some, kept, reasons in (
+        (np.array([0, 1, 3]), [0, 2], [[1, 2], [5, 6]]), (slice(2, 5), [0, 1], [[3, 4], [5, 6]]),
+        (slice(1, 2), [], []),
+    ):  # fmt: skip
+        part = whole.take_rows(some)
+        assert part.rows.tolist() == kept and part.reason.tolist() == reasons
+        assert part.count == len(np.arange(5)[some])
+    assert whole.at(whole.rows) is reason and whole.at(np.array([0, 2, 3])) is reason
+    assert whole.at(np.array([3, 0])).tolist() == [[5, 6], [1, 2]]
+    assert whole.at(np.array([0, 1])) is None
+    wide = whole.widened(np.array([3, 1]), 4)
+    assert wide.reason.tolist() == [[ABSENT, b, ABSENT, a] for a, b in reason.tolist()]
+    assert wide.rows.tolist() == [0, 2, 3] and wide.count == 5
+    both = Decision.join_rows([whole, whole.take_rows(slice(2, 5))])
+    assert both.rows.tolist() == [0, 2, 3, 5, 6] and both.count == 8
+    assert both.reason.tolist() == [*reason.tolist(), [3, 4], [5, 6]]

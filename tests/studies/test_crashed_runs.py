@@ -2,17 +2,20 @@
 
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
 
 from dsa_des.cli import main
-from dsa_des.results.folder import StudyFolder
+from dsa_des.results.folder import StudyFolder, undone_of
 from dsa_des.results.record import CRASHED, DONE
 from dsa_des.studies import executors
 from dsa_des.studies.attempts import TRIES, Attempts, halves
-from dsa_des.studies.chunk import Done
+from dsa_des.studies.chunk import Done, done_of, joined
 from dsa_des.studies.executors import Local
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import run_study
@@ -193,3 +196,25 @@ def test_halves_hold_each_run_once() -> None:
     runs = [(c, k) for part in (first, second) for c, a, b in part.runs for k in range(a, b)]
     assert runs == [(c, k) for c, a, b in chunk.runs for k in range(a, b)]
     assert (len(first), len(second)) == (3, 4)
+
+
+def test_a_part_says_what_its_runs_are_and_what_blocks_could_not_do() -> None:
+    """Of four runs one failed and one crashed; what is joined adds up, in order of cells."""
+
+    def part(cells: list[int], status: list[str], undone: dict) -> Done:
+        rows = {"cell": cells, "replica": [0] * len(cells), "status": status}
+        return done_of("part", pa.table(rows), undone)
+
+    what = {"tracker": {"it never had a track": (1, 4)}}
+    first = part([3, 1, 2, 0], ["done", "failed", "crashed", "done"], what)
+    assert (first.runs, first.failed, first.crashed) == (4, 2, 1)
+    assert undone_of(pq.read_table(pa.BufferReader(first.content))) == what
+    silent = part([4], ["done"], {})
+    table = pq.read_table(pa.BufferReader(silent.content))
+    assert (silent.runs, silent.failed, silent.crashed, undone_of(table)) == (1, 0, 0, {})
+    whole = joined("whole", [silent, replace(first, cpu_s=2.5), first])
+    table = pq.read_table(pa.BufferReader(whole.content))
+    assert table["cell"].to_pylist() == [0, 0, 1, 1, 2, 2, 3, 3, 4]
+    assert (whole.name, whole.runs, whole.failed, whole.crashed) == ("whole", 9, 4, 2)
+    assert undone_of(table) == {"tracker": {"it never had a track": (2, 8)}}
+    assert whole.cpu_s == 2.5

@@ -1,9 +1,12 @@
 """Pressure altitudes in air that is not the standard's: reported, corrected, estimated, noted."""
 
+from statistics import NormalDist
+
 import numpy as np
 import pytest
 from covering import covers
 from same_runs import tables_of
+from scipy.stats import chi2
 
 import dsa_des
 
@@ -103,23 +106,62 @@ def test_a_tracker_with_a_radar_estimates_what_pressure_altitudes_are_off_by(sen
     more = {"radar": RADAR, "fusion": {"type": "fusion.pass_through"},
             "tracker": {"type": "tracking.ekf"}}  # fmt: skip
 
-    def errors(**keys):
-        found = []
-        for seed in range(3):
-            top = {"wires": ["traffic -> transform -> gate", "gate -> radar -> fusion",
-                             "gate -> sensor -> fusion -> tracker"],
-                   "duration_s": 30, "seed": seed}  # fmt: skip
-            _, tables = tables_of(scene(of, LOW, more, top, **keys))
-            tracks = tables["state_tracks"].to_pandas()
-            late = tracks[(tracks.track_status == "confirmed") & (tracks.time_s > 15)]
-            fall_m = (late.north_m**2 + late.east_m**2) / 2 / 6.37e6
-            high_m = late.origin_alt_m - late.down_m + fall_m - 1200
-            found.append((high_m, high_m**2 / late.covariance_22_m2))
-        return [np.concatenate(part) for part in zip(*found, strict=True)]
+    def late_errors(qnh_hpa, seed=0, **keys):
+        """Return errors of the height and what is stated of them, while it is still far away."""
+        top = {"wires": ["traffic -> transform -> gate", "gate -> radar -> fusion",
+                         "gate -> sensor -> fusion -> tracker"],
+               "duration_s": 13, "seed": seed}  # fmt: skip
+        _, tables = tables_of(scene(of, {"qnh_hpa": qnh_hpa}, more, top, **keys))
+        tracks = tables["state_tracks"].to_pandas()
+        late = tracks[(tracks.track_status == "confirmed") & (tracks.time_s > 11)]
+        fall_m = (late.north_m**2 + late.east_m**2) / 2 / 6.37e6
+        high_m = late.origin_alt_m - late.down_m + fall_m - 1200
+        return high_m.iloc[-1], late.covariance_22_m2.iloc[-1]
 
-    off_m, squares = errors()
-    assert off_m.max() > 100
-    assert squares.mean() > 10  # tracks are sure of what is not so
-    estimated_m, squares = errors(pressure_deviation_m=150)
-    assert abs(estimated_m).max() < 60
-    assert 0.1 < squares.mean() < 2.5
+    # As the pressure is, on days whose pressure altitudes are off by 150 m (one sigma).
+    days = [NormalDist(1013.25, 150 / 8.3).inv_cdf((k + 0.5) / 12) for k in range(12)]
+    found = [late_errors(qnh, k, pressure_deviation_m=150) for k, qnh in enumerate(days)]
+    squares = sum(high_m**2 / variance for high_m, variance in found)
+    low, high = chi2.ppf([0.001, 0.999], len(days))
+    assert low < squares < high
+    # At 993 hPa, untold, tracks are off by 165 m (and that altimeter's error) and sure of it.
+    high_m, variance = late_errors(LOW["qnh_hpa"])
+    assert 100 < high_m < 250 and high_m**2 / variance > 10
+
+
+@covers("heights", of=("traffic.file", "traffic.csv", "traffic.daa_file"))
+@pytest.mark.parametrize("weather", [LOW, {**LOW, **WARM}])
+def test_recorded_pressure_altitudes_are_flown_where_the_air_has_them(tmp_path, weather):
+    """A transponder then reports what was recorded, and alert levels are those of one kind."""
+    rows = [f"{k},{name},{52 + sign * 6e-4 * k + at:.5f},4.0,{alt}" for k in range(20)
+            for name, sign, at, alt in (("own", 1, 0, 900), ("a", -1, 0.12, 1000))]  # fmt: skip
+    for name in ("t.csv", "t.daa"):
+        units = "\ns,none,deg,deg,m" if name == "t.daa" else ""
+        header = "time,id,lat,lon," + ("alt" if units else "baroaltitude")
+        (tmp_path / name).write_text("\n".join([header + units, *rows]))
+
+    def of(name, air, kind="file", **keys):
+        file = {"type": f"traffic.{kind}", "file": str(tmp_path / name), **keys,
+                "intruder": {"mode_s": True, "ads_b": {"nacp": 9, "nacv": 2}}}  # fmt: skip
+        alerting = {"type": "alerting.daidalus", "scan_rate_hz": 1, "conf": "alerting/do365b.conf"}
+        more = {"traffic": file, "alerting": alerting}
+        wires = ["traffic -> transform -> gate -> sensor", "traffic -> alerting"]
+        return tables_of(scene(ADS_B, air, more, {"wires": wires, "duration_s": 19}))
+
+    def levels(tables):
+        return tables["alerts"].select(["time_s", "target", "level"]).to_pydict()
+
+    simulation, plain = of("t.csv", weather)
+    (said,) = [one for one in simulation.components["traffic"].warnings() if "baroalt" in one]
+    assert "are flown as heights, off by" in said and "heights = 'pressure'" in said
+    assert len(set(levels(plain)["level"])) > 1
+    assert levels(plain) == levels(of("t.csv", {})[1])
+    for name, kind in (("t.csv", "file"), ("t.daa", "daa_file")):
+        simulation, tables = of(name, weather, kind, heights="pressure")
+        assert not any("baroalt" in one for one in simulation.components["traffic"].warnings())
+        assert levels(tables) == levels(plain)
+        reports = next(t for t in tables.values() if "reported_alt_m" in t.column_names)
+        assert reports["reported_alt_m"].to_numpy() == pytest.approx(1000.0, abs=0.01)
+        truth = tables["truth"].to_pandas()
+        flown_m = truth[truth.target == "a"].alt_m.to_numpy()
+        assert altimeter_m(flown_m, **weather) == pytest.approx(1000.0, abs=0.01)

@@ -8,7 +8,9 @@ import numpy as np
 import pymap3d
 import pytest
 from scipy.ndimage import map_coordinates
+from wired import chain
 
+import dsa_des
 from components.flights.bounds import _place, check_above_terrain, check_on_raster
 from components.terrain.raster import ElevationRaster, mosaic, read_raster
 from components.terrain.rays import (
@@ -21,6 +23,8 @@ from components.terrain.rays import (
     rays_between,
 )
 from docs.make.synthetic_raster import NAME, main, synthetic_heights_m
+from dsa_des.errors import SceneError
+from dsa_des.running.simulation import Simulation
 
 R = 6371008.8
 
@@ -364,3 +368,22 @@ def test_an_ownship_that_moves_between_samples_turns_by_the_shortest_radius():
     assert heights == pytest.approx((2.0e4 - moves_m, 3.0e4 + moves_m))
     near = SimpleNamespace(lat_deg=np.array([-89.5, 89.5]), alt_m=np.zeros(2))
     assert _place(near, moves_m)[0] == (-90.0, 90.0)
+
+
+def test_a_scene_whose_ownship_flies_into_the_ground_is_refused():
+    """Sinking 2 m/s from 900 m: level with 890 m after 5 s."""
+    own = {"lat_deg": 45.0, "lon_deg": 7.0, "alt_m": 900, "heading_deg": 0, "speed_mps": 40,
+           "climb_mps": -2.0}  # fmt: skip
+    eye = {"type": "optical.range_boundary", "range_km": 9.0, "scan_rate_hz": 1}
+    for height_m, duration_s in ((889.9, 5), (890.0, 4), (890.0, 5)):
+        scene = dsa_des.load_scene(
+            chain({"eye": eye}, ownship=own, duration_s=duration_s, terrain={"height_m": height_m})
+        )
+        if (height_m, duration_s) != (890.0, 5):
+            assert Simulation(scene).duration_s == duration_s
+            continue
+        with pytest.raises(SceneError) as error:
+            Simulation(scene)
+        assert str(error.value).endswith(
+            "[terrain] height_m is 890: it must be below the ownship, which is at 890 m at 5 s"
+        )

@@ -10,13 +10,19 @@ import pytest
 from wired import chain, rows, run
 
 import dsa_des
-from components.messages.detections import promises_of_looks
+from components.messages.detections import (
+    LastingError,
+    LastingPart,
+    SensorOffer,
+    promises_of_looks,
+)
 from components.surveillance.reception import (
     certain,
     do_365_reception_probability,
     time_to_receive_s,
 )
 from components.tracking.promises import Promises
+from components.tracking.rules import LastingErrors
 from components.tracking.scans import Scans
 from dsa_des.running.simulation import Simulation
 
@@ -243,3 +249,57 @@ class _Looks:
     measured: Any
     offsets: Any
     pose: Any
+
+
+def test_what_errors_of_two_looks_have_in_common_is_as_by_hand():
+    """Each cell of sensors and quantities by itself; of a look that was never before, nothing."""
+    offers = {
+        "radar": SensorOffer(True, 0.1, lasting={
+            "azimuth": LastingError(parts=(LastingPart(variance=1e-6, across_m2=25.0),)),
+            "elevation": LastingError(parts=(LastingPart(-0.005, share=0.25, lasts_s=5.0),
+                                             LastingPart(variance=0.01, lasts_s=10.0))),
+            "range": LastingError(step=2.0, parts=(LastingPart(variance=4.0, lasts_s=10.0),)),
+            "range_rate": LastingError(step=1.0, parts=(LastingPart(0.1, lasts_s=10.0),
+                                                        LastingPart(0.05))),
+        }),
+        "eye": SensorOffer(False, 0.1, lasting={"azimuth": LastingError(step=0.6)}),
+        "ear": SensorOffer(False, 0.1, lasting={"velocity": LastingError(parts=(
+            LastingPart(variance=9.0, lasts_s=2.0),))}),
+        "nose": SensorOffer(False, 0.1),
+    }  # fmt: skip
+    lasting = LastingErrors.of(offers, ("eye", "radar", "nose", "ear"))
+    assert LastingErrors.of(offers, ("nose",)) is None
+    assert lasting.lasts.tolist() == [True, True, False, True, False] and lasting.sensors == 0b1011
+
+    def common(row, sensor, variance, since_s, moved=0.0, range_m=1000.0):
+        one = np.ones((1, 1))
+        sensors = np.array([[sensor]])
+        return lasting.common(
+            [row], sensors, variance * one, moved * one, since_s * one, range_m * one
+        )[0, 0]
+
+    e = math.exp
+    # Across 5 m at 1 km, and at 100 m; for ever. Nearer than 1 m counts as 1 m.
+    assert common(0, 1, 1e-3, 7.0) == pytest.approx(1e-6 + 25e-6)
+    assert common(0, 1, 1e-1, 7.0, range_m=100.0) == pytest.approx(1e-6 + 25e-4)
+    assert common(0, 1, 40.0, 7.0, range_m=0.1) == pytest.approx(1e-6 + 25.0)
+    # A quarter of what is stated but 0.005, forgotten in 5 s, and a part of its own, in 10 s.
+    assert common(1, 1, 0.08, 5.0) == pytest.approx(0.015 * e(-1.0) + 0.01 * e(-0.5))
+    assert common(1, 1, 0.01, 5.0) == pytest.approx(0.01 * e(-0.5))  # the first is not below 0
+    # Of a range nothing of its own is left to blur the grid: a cell of 2 m, moved by half a metre.
+    assert common(2, 1, 4.0 + 1.0 / 3.0, 5.0, moved=0.5) == pytest.approx(
+        4.0 * e(-0.5) + e(-1.5) / 3.0
+    )
+    # And 0.1 m² of noise: 4 pi² 0.1 / 4 less.
+    assert common(2, 1, 4.1 + 1.0 / 3.0, 5.0) == pytest.approx(
+        4.0 * e(-0.5) + e(-(math.pi**2) * 0.1) / 3.0
+    )
+    # Two parts and 0.02 m²/s² of noise, which blurs the grid of 1 m/s.
+    assert common(3, 1, 1.0 / 12.0 + 0.17, 10.0) == pytest.approx(
+        0.1 * e(-1.0) + 0.05 + e(-4.0 * math.pi**2 * 0.02) / 12.0
+    )
+    assert common(0, 0, 0.03, 1.0) == pytest.approx(0.03)  # all of it a cell's: 0.6² / 12
+    # Velocities share one quantity; the eye has none; who was not seen has nothing.
+    assert common(4, 3, 10.0, 2.0) == common(6, 3, 10.0, 2.0) == pytest.approx(9.0 * e(-1.0))
+    assert common(3, 0, 1.0, 1.0) == common(0, 2, 1.0, 1.0) == 0.0
+    assert common(2, 1, 9.0, math.inf) == 0.0

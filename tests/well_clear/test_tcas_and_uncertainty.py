@@ -5,8 +5,18 @@ import numpy as np
 import pytest
 
 from components.arguments.units import FOOT_M
-from components.well_clear.detection import Bounds, uncertain_violation_span
-from components.well_clear.tcas import RESOLUTION_ADVISORY, TRAFFIC_ADVISORY, tcas_span
+from components.well_clear.detection import (
+    Bounds,
+    detection_span,
+    some_bounds,
+    uncertain_violation_span,
+)
+from components.well_clear.tcas import (
+    RESOLUTION_ADVISORY,
+    TRAFFIC_ADVISORY,
+    TcasAdvisory,
+    tcas_span,
+)
 from components.well_clear.volume import Volume, violation_span
 from tests.well_clear.test_violation_spans import random_states, span_by_bisection
 
@@ -100,6 +110,58 @@ def test_an_ownship_that_comes_to_wider_limits_is_advised_from_there_on(climb_mp
         assert span.begin_s == pytest.approx([0.5, 0.5]) and (span.end_s == 60.0).all()
 
 
+#: Position, height, velocity and climb are wrong by at most so much.
+WRONG = (100.0, 20.0, 10.0, 1.0)
+#: Relative state, bounds, from when and until when is looked, and the span, in closed form.
+SPANS = [
+    # Head on: the soonest over 4,900 - 900 m at 110 m/s, the last to leave 6,000 m at 90 m/s.
+    ((-5000, 0, 0, 100, 0, 0), WRONG, 0.0, 90.0, 4000 / 110, 6000 / 90),
+    ((0, 5000, 0, 0, -100, 0), WRONG, 40.0, 60.0, 40.0, 60.0),
+    ((0, 5000, 0, 0, -100, 0), WRONG, 0.0, 36.0, np.inf, -np.inf),
+    ((0, 5000, 0, 0, 100, 0), WRONG, 0.0, 60.0, np.inf, -np.inf),
+    # Exactly known, beside others that are not: 4,100 m and 5,900 m at 100 m/s.
+    ((3000, 4000, 0, -60, -80, 0), (0, 0, 0, 0), 0.0, 90.0, 41.0, 59.0),
+    ((3000, 4000, 0, -60, -80, 0), (0, 0, 0, 0), 45.0, 50.0, 45.0, 50.0),
+    # Leaving from within: 500 m more to 1,000 m at 90 m/s.
+    ((500, 0, 0, 100, 0, 0), WRONG, 0.0, 90.0, 0.0, 500 / 90),
+    # Nobody moves: within 1,000 m for ever, or never; if it can move, over 3,900 - 900 m at 15 m/s.
+    ((950, 0, 0, 0, 0, 0), WRONG, 0.0, 90.0, 0.0, 90.0),
+    ((4000, 0, 0, 5, 0, 0), WRONG, 0.0, 90.0, np.inf, -np.inf),
+    ((4000, 0, 0, 5, 0, 0), WRONG, 0.0, 300.0, 200.0, 300.0),
+    # Above, coming down: 580 - 250 m at 6 m/s, and 620 + 250 m at 4; the same from below.
+    ((0, 0, 600, 0, 0, -5), WRONG, 0.0, 300.0, 55.0, 217.5),
+    ((0, 0, -600, 0, 0, 5), WRONG, 0.0, 300.0, 55.0, 217.5),
+    ((0, 0, 600, 0, 0, -5), WRONG, 0.0, 100.0, 55.0, 100.0),
+    # Both: level from 55 s on, within 900 m from 4000 / 110 to 6000 / 90.
+    ((-5000, 0, 600, 100, 0, -5), WRONG, 0.0, 300.0, 55.0, 6000 / 90),
+    # Climbing away from within: 250 - 80 m at 4 m/s; level and out of it, never.
+    ((0, 0, 100, 0, 0, 5), WRONG, 0.0, 300.0, 0.0, 170 / 4),
+    ((0, 0, 300, 0, 0, 5), WRONG, 0.0, 300.0, np.inf, -np.inf),
+    ((0, 0, 260, 0, 0, 0), WRONG, 0.0, 50.0, 0.0, 50.0),
+]  # fmt: skip
+
+
+def test_how_far_spans_reach_is_that_of_the_worst_within_the_bounds():
+    states, bounds, begin_s, end_s, *wanted = (
+        np.array(part, float).T for part in zip(*SPANS, strict=True)
+    )
+    volume = Volume(900.0, 250.0)
+    found = detection_span(volume, tuple(states), None, Bounds(*bounds), begin_s, end_s)
+    np.testing.assert_allclose(found, wanted, rtol=1e-12)
+    one = [tuple(states[:, :1]), None, Bounds(*bounds[:, :1]), 0.0, 90.0]
+    np.testing.assert_allclose(
+        np.ravel(detection_span(volume, *one)), [4000 / 110, 6000 / 90], rtol=1e-12
+    )
+    # Nothing said of errors is none.
+    plain = detection_span(volume, tuple(states), None, None, begin_s, end_s)
+    np.testing.assert_allclose(plain, violation_span(volume, tuple(states), begin_s, end_s))
+    with pytest.raises(ValueError, match="advisories of TCAS II need the ownship's altitude"):
+        detection_span(TcasAdvisory(True), tuple(states), None, None, 0.0, 60.0)
+    part = some_bounds(Bounds(*bounds), [0, 4])
+    assert [value.tolist() for value in part] == [[100, 0], [20, 0], [10, 0], [1, 0]]
+    assert some_bounds(None, [0, 4]) is None
+
+
 def test_no_state_within_the_bounds_violates_outside_the_span():
     """Drawn on the bounds and within them, in position, height and both speeds."""
     draw, count = np.random.default_rng(1), 150
@@ -115,6 +177,13 @@ def test_no_state_within_the_bounds_violates_outside_the_span():
     span = uncertain_violation_span(volume, tuple(nominal), bounds, 0.0, 180.0)
     plain = violation_span(volume, tuple(nominal), 0.0, 180.0)
     assert (span.begin_s <= plain.begin_s).all() and (span.end_s >= plain.end_s).all()
+    # With next to no error it is next to the same: it reaches no farther than it must.
+    wide = Volume(3000.0, 300.0, 35.0, 20.0)
+    next_to_none = Bounds(*np.full((4, count), 1e-3))
+    tight = uncertain_violation_span(wide, tuple(nominal), next_to_none, 0.0, 180.0)
+    exact = violation_span(wide, tuple(nominal), 0.0, 180.0)
+    np.testing.assert_allclose(tight, exact, rtol=0.0, atol=0.02)
+    assert np.isfinite(exact.begin_s).sum() > 20
     hits = 0
     for _ in range(120):
         way = draw.uniform(0, 2 * np.pi, (2, count))

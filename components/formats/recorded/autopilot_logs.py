@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from components.formats.recorded.ulog_file import Topic, read_topics
-from components.formats.reports import Log, PositionReport
+from components.formats.reports import ABOVE_SEA, Log, PositionReport
 from components.formats.text_rows import Problems
 from dsa_des.arrays.types import AnyArray, FloatArray
 
@@ -47,7 +47,7 @@ def ulog_log(problems: Problems, data: bytes, stem: str) -> Log:
             what = f"{type(error).__name__}: {error}"
             problems.fail(f"its topics are not as PX4 writes them ({what})")
 
-    return Log("a PX4 log (ULog)", "m and m/s", each(), callsigns, "samples", warnings)
+    return Log("a PX4 log (ULog)", "m and m/s", each(), callsigns, "samples", warnings, ABOVE_SEA)
 
 
 def _utc_less_boot_s(topics: Mapping[str, Topic]) -> float:
@@ -235,7 +235,7 @@ def tlog_log(problems: Problems, data: bytes, stem: str) -> Log:
             warnings.append(f"{len(lost)} {what} damaged and left out")
 
     units = "1e-7 deg, mm and cm/s"
-    return Log("a MAVLink log (tlog)", units, each(), callsigns, "frames", warnings)
+    return Log("a MAVLink log (tlog)", units, each(), callsigns, "frames", warnings, ABOVE_SEA)
 
 
 def _frames(data: bytes, lost: list[int]) -> Iterator[tuple[int, _Frame]]:

@@ -58,7 +58,7 @@ _OTHERS = (
 def record(
     path: Path,
     altitude: Altitude | None = None,
-    reference: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    place: tuple[float, float, float] | None = None,
 ) -> Recording:
     """Return the aircraft of a file of any known kind.
 
@@ -67,8 +67,8 @@ def record(
     path : Path
     altitude : optional
         Which altitude is read where there are two.
-    reference : (latitude, longitude, altitude)
-        Where the origin of an ``.xyz`` file is put: deg, m.
+    place : (latitude, longitude, altitude), optional
+        Where radars are that do not say it, and the origin of an ``.xyz`` file: deg, m.
 
     Raises
     ------
@@ -83,9 +83,9 @@ def record(
     if data.startswith(_PARQUET):
         return _of_parquet(problems, data, altitude, stem)
     if is_capture(data):
-        return _of_capture(problems, data, altitude)
+        return _of_capture(problems, data, altitude, place)
     if path.suffix.lower() == ".ast" or _is_asterix(data):
-        return record_asterix(problems, data, altitude)
+        return record_asterix(problems, data, altitude, place=place)
     log = _log_of(problems, data, stem)
     if log is not None:
         del data  # its reader holds what it needs of it
@@ -98,7 +98,7 @@ def record(
     text = text_of(data, problems, f"a file of a known kind ({KINDS})")
     del data
     if path.suffix.lower() in (".daa", ".xyz") or _is_daa(text):
-        return record_daa(problems, text, reference)
+        return record_daa(problems, text, place or (0.0, 0.0, 0.0))
     try:
         return record_table(problems, text, None, altitude, stem)
     except TrafficFileError as error:
@@ -197,10 +197,13 @@ def _is_readable(path: Path, data: bytes) -> bool:
     return True
 
 
-def _of_capture(problems: Problems, data: bytes, altitude: Altitude | None) -> Recording:
+def _of_capture(
+    problems: Problems, data: bytes, altitude: Altitude | None,
+    place: tuple[float, float, float] | None,
+) -> Recording:  # fmt: skip
     """Return the aircraft of the datagrams of a capture that are ASTERIX, on the capture's day."""
     first_s, blocks, other = _blocks_of(problems, data)
-    recording = record_asterix(problems, blocks, altitude, of_day_s=first_s)
+    recording = record_asterix(problems, blocks, altitude, of_day_s=first_s, place=place)
     if other:
         recording.notes.warnings.append(
             f"{other} datagrams are no ASTERIX that can be read and were left out"

@@ -35,8 +35,8 @@ class TrafficChoice:
     ownship : str, optional
         Name or callsign; by default the first aircraft.
     altitude : optional
-    reference : (latitude, longitude, altitude)
-        Of an ``.xyz`` file's origin.
+    place : (latitude, longitude, altitude), optional
+        Of radars that do not say it, and of an ``.xyz`` file's origin.
     own_file : Path, optional
         Whose `ownship` is flown among the aircraft of the other files.
     own_starts_s : float, optional
@@ -58,7 +58,7 @@ class TrafficChoice:
 
     ownship: str | None = None
     altitude: Altitude | None = None
-    reference: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    place: tuple[float, float, float] | None = None
     own_file: Path | None = None
     own_starts_s: float | None = None
     own_moved: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -77,7 +77,7 @@ def read_traffic(paths: Sequence[Path], choice: TrafficChoice) -> TrafficFile:
     TrafficFileError says all that is wrong.
     """
     names = [path.stem for path in paths]
-    each = (record(path, choice.altitude, choice.reference) for path in paths)
+    each = (record(path, choice.altitude, choice.place) for path in paths)
     whole = drop_aircraft(join_recordings(zip(names, each, strict=True)), choice.without)
     start_s = _earliest(whole)
     own = {} if choice.scripted else _ownship_samples(whole, choice, start_s)
@@ -117,7 +117,7 @@ def _ownship_samples(whole: Recording, choice: TrafficChoice, start_s: float) ->
         whole.samples = with_ownship(whole, own).samples
         called, columns = own, whole.samples[own]
     else:
-        flight = record(choice.own_file, choice.altitude, choice.reference)
+        flight = record(choice.own_file, choice.altitude, choice.place)
         own = next(iter(flight.samples)) if choice.ownship is None else find_aircraft(
             flight.problems, flight, choice.ownship
         )  # fmt: skip
@@ -127,7 +127,7 @@ def _ownship_samples(whole: Recording, choice: TrafficChoice, start_s: float) ->
         whole.notes.add(flight.notes, choice.own_file.name)
         if flight.height != whole.height:
             said = f"heights of the ownship: {flight.height}; of the others: {whole.height}"
-            whole.notes.harmless.append(said)
+            whole.notes.warnings.append(said)
     later_s = 0.0
     if choice.own_starts_s is not None:
         others = replace(whole, samples={n: c for n, c in whole.samples.items() if n != called})

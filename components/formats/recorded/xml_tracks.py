@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from typing import Any
 from xml.etree import ElementTree
 
-from components.formats.reports import Log, PositionReport
+from components.formats.reports import ABOVE_SEA, Log, PositionReport
 from components.formats.text_rows import Problems
 
 
@@ -19,13 +19,12 @@ def xml_log(problems: Problems, data: bytes, stem: str) -> Log | None:
     problems.of = "point"
     head = data[:4096].lower()
     if b"<gpx" in head:
-        return Log(
-            "GPX tracks", "m", _points(problems, _of_gpx(problems, data, stem)), {}, "points"
-        )
+        points = _points(problems, _of_gpx(problems, data, stem))
+        return Log("GPX tracks", "m", points, {}, "points", geometric=ABOVE_SEA)
     if b"<kml" in head or (b"<document" in head and b"<placemark" in data.lower()):
         warnings: list[str] = []
         points = _points(problems, _of_kml(problems, data, stem, warnings))
-        return Log("KML tracks", "m", points, {}, "points", warnings)
+        return Log("KML tracks", "m", points, {}, "points", warnings, ABOVE_SEA)
     return None
 
 

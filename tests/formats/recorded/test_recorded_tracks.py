@@ -38,8 +38,8 @@ def test_tracks_in_xml_are_flown(tmp_path, data):
     assert list(read_in.samples) == ["one", "two"]
     assert_flown(read_in.samples["one"], FIXES)
     assert_flown(read_in.samples["two"], OTHER)
-    assert read_in.height == "geometric altitude"
-    assert "geometric altitude is read: there is no barometric altitude" in read_in.notes.harmless
+    assert read_in.height == "geometric altitude above mean sea level"
+    assert f"{read_in.height} is read: there is no barometric altitude" in read_in.notes.harmless
 
 
 def test_placemarks_with_times_are_the_document_s_flight(tmp_path):

@@ -1,6 +1,7 @@
 """OpenSky's history in CSV and Parquet, tables of one flight, and ASTERIX in captures."""
 
 import json
+import struct
 from datetime import UTC, datetime
 
 import numpy as np
@@ -11,8 +12,9 @@ import recorded_files as write
 
 from components.formats.asterix_records import ADS_B, PLOTS, AsterixRecord, write_records
 from components.formats.measurement_file import read_measurements
+from components.formats.recorded import captures
 from components.formats.recorded.known_kinds import captured_asterix, record
-from components.formats.text_rows import TrafficFileError
+from components.formats.text_rows import Problems, TrafficFileError
 
 START = 1_717_243_200
 
@@ -204,3 +206,78 @@ def test_a_damaged_file_gives_one_error_or_whole_flights(tmp_path, name):
     if name in ("a.pcap", "a.pcapng", "a.ast"):
         pytest.importorskip("asterix", reason="needs asterix")
     write.assert_refused_or_whole(tmp_path / name, KINDS[name](tmp_path))
+
+
+def udp_v4(payload: bytes, protocol: int = 17, fragment: int = 0) -> bytes:
+    """RFC 791 and 768: a header of 24 bytes, 4 of them an option, and what is behind the end."""
+    size = 24 + 8 + len(payload)
+    ip = struct.pack(">BBHHHBBH8x4x", 0x46, 0, size, 1, fragment, 64, protocol, 0)
+    return ip + struct.pack(">4H", 5, 6, 8 + len(payload), 0) + payload + b"behind it"
+
+
+def udp_v6(payload: bytes) -> bytes:
+    """RFC 8200: a header of 40 bytes."""
+    ip = struct.pack(">IHBB32x", 6 << 28, 8 + len(payload), 17, 64)
+    return ip + struct.pack(">4H", 5, 6, 8 + len(payload), 0) + payload
+
+
+def ethernet(ip: bytes, kind: int = 0x0800, vlans: int = 0) -> bytes:
+    return bytes(12) + b"\x81\x00\x00\x07" * vlans + struct.pack(">H", kind) + ip
+
+
+#: Kind of link, a packet, and what it holds over UDP.
+PACKETS = [
+    (1, ethernet(udp_v4(b"one")), b"one"), (1, ethernet(udp_v4(b"two"), vlans=2), b"two"),
+    (1, ethernet(udp_v6(b"three"), 0x86DD), b"three"), (101, udp_v6(b"four"), b"four"),
+    (0, bytes(4) + udp_v4(b"five"), b"five"), (113, bytes(14) + b"\x08\x00" + udp_v4(b"6"), b"6"),
+    (276, b"\x08\x00" + bytes(18) + udp_v4(b"seven"), b"seven"),
+    (1, ethernet(udp_v4(b"tcp", protocol=6)), None), (1, ethernet(udp_v4(b"arp"), 0x0806), None),
+    (101, udp_v4(b"a part", fragment=0x2000), None), (105, udp_v4(b"of no known link"), None),
+    (101, b"", None), (101, b"\x50" + bytes(60), None), (101, udp_v4(b"")[:19], None),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("magic", captures._PCAP)
+def test_datagrams_of_every_link_are_taken_out_of_a_capture(magic: bytes) -> None:
+    order, fraction_s = {0xD4: ("<", 1e-6), 0xA1: (">", 1e-6), 0x4D: ("<", 1e-9)}[magic[0]]
+    if magic == b"\xa1\xb2\x3c\x4d":
+        fraction_s = 1e-9
+    for link, packet, payload in PACKETS:
+        head = (
+            magic + struct.pack(f"{order}2H3I", 2, 4, 0, 0, 65535) + struct.pack(f"{order}I", link)
+        )
+        good = head[:20] + struct.pack(f"{order}I", 1)
+        other = struct.pack(f"{order}4I", 7, 500, len(packet), len(packet)) + packet
+        known = ethernet(udp_v4(b"known"))
+        last = struct.pack(f"{order}4I", 9, 250, len(known), len(known)) + known
+        if payload is not None:
+            found = captures.udp_payloads(Problems("a.pcap"), head + other)
+            assert found == [(pytest.approx(7 + 500 * fraction_s), payload)]
+            continue
+        with pytest.raises(TrafficFileError, match=rf"no UDP .* packets are of link type {link}\)"):
+            captures.udp_payloads(Problems("a.pcap"), head + other)
+        if link == 1:
+            found = captures.udp_payloads(Problems("a.pcap"), good + other + last)
+            assert found == [(pytest.approx(9 + 250 * fraction_s), b"known")]
+
+
+def test_where_a_capture_is_cut_off_is_said_as_a_whole() -> None:
+    packet = ethernet(udp_v4(b"one"))
+    head = b"\xd4\xc3\xb2\xa1" + bytes(16) + struct.pack("<I", 1)
+    one = struct.pack("<4I", 7, 0, len(packet), len(packet)) + packet
+    block = struct.pack("<3I", 6, 12, 12)
+    for data, said in (
+        (head[:20], "the capture is cut off in its header"),
+        (head, "the capture holds no packets"),
+        (head + one + one[:15], "packet 2: the capture is cut off"),
+        (head + one + one[:-1],
+         f"packet 2: has {len(packet)} bytes, but the capture ends before"),
+        (captures._PCAPNG + b"\x1c\0\0\0", "packet 1: the capture is cut off"),
+        (captures._PCAPNG + struct.pack(">2I", 13, 0), "packet 1: a block of 13 bytes does not fit "
+         "into the capture"),
+        (captures._PCAPNG + struct.pack("<3I", 12, 0x1A2B3C4D, 12)[:8] + block,
+         "packet 2: the block is damaged"),
+    ):  # fmt: skip
+        with pytest.raises(TrafficFileError) as error:
+            captures.udp_payloads(Problems("a.pcap"), data)
+        assert str(error.value) == f"a.pcap: {said}"

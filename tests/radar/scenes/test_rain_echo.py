@@ -144,8 +144,14 @@ def said_of(kind: str, **keys) -> str:
 
 
 def test_check_says_where_rain_has_no_echo():
-    assert "no effect on this radar, whose frequency_hz is not given" in said_of(
-        "radar.range_boundary", range_km=9.0)  # fmt: skip
+    no_effect = (
+        "[weather] rain_rate_mm_h: no effect on this radar, whose frequency_hz is not given: its "
+        "boundary lies where range_km says, in any weather"
+    )
+    assert no_effect in said_of("radar.range_boundary", range_km=9.0)
+    for keys in ({"enabled": False}, {"frequency_hz": 9e9}):
+        assert "no effect on this radar" not in said_of(
+            "radar.range_boundary", range_km=9.0, **keys)  # fmt: skip
     keys = {key: value for key, value in BEAM.items() if key != "range_cell_m"}
     assert "range_resolution_m is 0 and range_cell_m is not given" in said_of(
         "radar.threshold", **keys)  # fmt: skip

@@ -277,14 +277,18 @@ def test_who_is_beside_the_ownship_for_half_the_time_is_another(tmp_path):
 
 def test_heights_of_several_kinds_are_said(tmp_path):
     one, two = gpx(tmp_path, "one.gpx", a=flight()), tmp_path / "two.igc"
-    for pressure_m, kinds in ((None, {"geometric altitude"}), ([900] * 60, None)):
+    for pressure_m, other in ((None, "geometric altitude"), ([900] * 60, "barometric altitude")):
         two.write_bytes(write.igc(flight(lat=47.1), pressure_m, name="b"))
         content = traffic([one, two]).content
-        kinds = kinds or {"geometric altitude", "barometric altitude"}
-        assert content.height == ", ".join(sorted(kinds))
-        assert [w for w in content.warnings if "heights of several kinds" in w] == (
-            [f"heights of several kinds are flown together: {content.height}"] * (len(kinds) > 1)
+        assert content.height == f"{other}, geometric altitude above mean sea level" or (
+            content.height == f"geometric altitude above mean sea level, {other}"
         )
+        said = f"heights of several kinds are flown together: {content.height}"
+        assert said in content.warnings
+        (said,) = [w for w in traffic([two], own_file=str(one)).content.warnings if "heights" in w]
+        assert said.startswith("heights of the ownship: geometric altitude above mean sea level;")
+    two.write_bytes(write.gpx({"b": flight(lat=47.1)}))
+    assert not any("heights" in w for w in traffic([one, two]).content.warnings)
 
 
 @covers("without", of=NAMES)
