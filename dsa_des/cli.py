@@ -100,6 +100,9 @@ def explain(**options: Any) -> None:
     explain_scene(**options)
 
 
+_resume_option = click.option(
+    "--resume", is_flag=True, help="Run only what is missing of an earlier attempt."
+)
 _workers_option = click.option(
     "--workers", type=int, metavar="N", help="Processes [default: one per processor]."
 )
@@ -153,6 +156,8 @@ _workers_option = click.option(
     help="Draw maps of the rungs' errors: geometry; needs no SCENE.",
 )
 @click.option("--out", metavar="DIR", help="Folder for the results [default: runs/SCENE-cost-NNN].")
+@_resume_option
+@_figures_option
 @click.option("--json", "as_json", is_flag=True, help="Print the rows as JSON only.")
 @plain_errors
 def cost(answers: tuple[str, ...], listed: tuple[str, ...], **options: Any) -> None:
@@ -217,7 +222,7 @@ _measure_option = click.option(
 @seed_option
 @_replicas_option
 @_workers_option
-@click.option("--resume", is_flag=True, help="Run only what is missing of an earlier attempt.")
+@_resume_option
 @click.option("--executor", type=click.Choice(["local", "dask"]), default="local")
 @click.option("--scheduler", metavar="ADDR", help="Dask scheduler, e.g. tcp://localhost:8786.")
 @_out_option
@@ -296,7 +301,7 @@ def compare(**options: Any) -> None:
     "--encounters", type=int, metavar="N", help="Of the system and what stands beside it."
 )
 @_workers_option
-@click.option("--resume", is_flag=True, help="Run only what is missing of an earlier attempt.")
+@_resume_option
 @plain_errors
 def evidence(**options: Any) -> None:
     """Run a CASE from requirement to verdict: a folder that a stranger can run again.

@@ -52,10 +52,10 @@ def hold_problems_to_sentences() -> None:
 
     made = Problem.__init__
 
-    def checked(self: Problem, source: str, key: str, message: str, *value: Any) -> None:
+    def checked(self: Problem, source: str, key: str, message: str, *value: Any, **by_name: Any):
         is_sentence = isinstance(message, str) and " " in message
         assert is_sentence and isinstance(key, str), (source, key, message, *value)
-        made(self, source, key, message, *value)
+        made(self, source, key, message, *value, **by_name)
 
     Problem.__init__ = checked  # type: ignore[method-assign]
 

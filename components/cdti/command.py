@@ -37,6 +37,11 @@ from dsa_des.commands.group import plain_errors, scene_options
     show_default=True,
     help="What the display begins with: nmi, ft and kt, or km, m and m/s.",
 )
+@click.option(
+    "--platform",
+    metavar="NAME",
+    help="Whose display [default: what carries the operator's console, or the ownship].",
+)
 @click.option("--no-wait", is_flag=True, help="Begin before an operator is there and ready.")
 @click.option("--no-figures", is_flag=True, help="Draw nothing; results are the same.")
 @plain_errors

@@ -5,6 +5,7 @@ replaced as a whole, never changed.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -27,6 +28,7 @@ from components.messages.alerts import (
     GuidanceBands,
     contact_name,
 )
+from components.messages.decisions import Decisions
 from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import StateTracks
@@ -36,6 +38,7 @@ from components.sensor.marks import IR
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
+from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.running.simulation import Simulation
 from dsa_des.text.safe_text import printable
 
@@ -43,6 +46,8 @@ from dsa_des.text.safe_text import printable
 FORGOTTEN_S = 10.0
 #: Bands of guidance stand for so long, s: until the alerting has looked again.
 BANDS_LAST_S = 1.5
+#: A sensor from which nothing has come for so many of its scans, and so long, is said to be out.
+_SILENT_SCANS, _SILENT_S = 2.5, 1.0
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 _LOOKAHEAD_S = 120.0
 _UNKNOWN = (None, None, None)
@@ -73,15 +78,25 @@ class Received(NamedTuple):
     #: Altitude and rate of climb that targets report themselves, m and m/s, and when.
     reported: dict[int, tuple[float, float, float]]
     bands: tuple[float, GuidanceBands] | None
+    #: When each sensor was heard of last, s.
+    heard: dict[str, float]
 
 
 class Scope:
-    """The state of the display."""
+    """The state of the display on a platform, by default that of the operator's console.
 
-    def __init__(self, simulation: Simulation) -> None:
+    It shows what the blocks on board of it say; without a console, on board of the ownship.
+    """
+
+    def __init__(self, simulation: Simulation, platform: str | None = None) -> None:
         self._per_s = simulation.ticks_per_s
+        self._platform = _shown(simulation, platform)
+        on = "", self._platform
+        components = {n: c for n, c in simulation.components.items() if c.context.platform in on}
+        #: Blocks whose messages are shown.
+        self._on_board = frozenset(components)
         self._own = OwnFlight()
-        self._sights = CameraSights(simulation.components)
+        self._sights = CameraSights(components)
         self._contacts: Contacts | None = None
         self._alerts: _Alerts | None = None
         self._since: dict[int, float] = {}
@@ -89,13 +104,15 @@ class Scope:
         self._bands: tuple[float, GuidanceBands] | None = None
         #: What was made of the latest alerts, for as long as they are the latest.
         self._looked: tuple[_Alerts, Any, Any, Any] | None = None
+        self._heard: dict[str, float] = {}
+        self._silence_s = _longest_silence_s(simulation)
         self._names: tuple[str, ...] = ()
         #: Names of all targets, fit to be shown.
         self.names: list[str] = []
-        self._rules = _rules_of(simulation)
+        self._rules = _rules_of(components)
         senders = {
             type_of
-            for block in simulation.components.values()
+            for block in components.values()
             for type_of in (o.message for o in block.outputs.values())
         }
         kinds = (StateTracks, Tracks, FusedDetections)
@@ -103,7 +120,7 @@ class Scope:
         self._believed = next((k for k in kinds if any(issubclass(t, k) for t in senders)), None)
         self.sensors = [
             _sensor(name, component)
-            for name, component in sorted(simulation.components.items())
+            for name, component in sorted(components.items())
             if any(issubclass(o.message, Detections) for o in component.outputs.values())
         ]
 
@@ -111,13 +128,15 @@ class Scope:
 
     def listen(self, block: str, message: Message) -> None:
         """Take in what a block has sent."""
-        if len(message) == 0:
+        if len(message) == 0 or block not in self._on_board:
             return
         if isinstance(message, TrafficStates):
+            message = message.seen_from(self._platform or message.roster.own_name)
             self._own.take(message, self._per_s)
             self._sights.states = message
             self._name(message.roster.names)
         elif isinstance(message, Detections):
+            self._heard = {**self._heard, block: int(message.tick[-1]) / self._per_s}
             self._sights.take(block, message, self._per_s)
             self._take_reports(message)
         elif isinstance(message, AlertLevels):
@@ -189,8 +208,9 @@ class Scope:
     def take_received(self) -> Received:
         """Return all that was received until now; between two windows it is of one instant."""
         return Received(
-            self._own.now, self._contacts, self._alerts, self._since, self._reported, self._bands
-        )
+            self._own.now, self._contacts, self._alerts, self._since, self._reported, self._bands,
+            self._heard,
+        )  # fmt: skip
 
     def level_of(self, contact: int) -> int:
         """Return the level of the alert on a contact, 0 without one."""
@@ -209,11 +229,13 @@ class Scope:
 
     def picture(self, time_s: float, received: Received | None = None) -> dict[str, Any]:
         """Return what is shown at an instant of what was received, for JSON: m, deg, s."""
-        own, contacts, alerts, since, reported, bands = (
+        own, contacts, alerts, since, reported, bands, heard = (
             self.take_received() if received is None else received
         )
         if own is None:
-            return {"own": None, "contacts": [], "alerts": [], "area": [], "bands": {}}
+            return {
+                "own": None, "contacts": [], "alerts": [], "area": [], "bands": {}, "out": []
+            }  # fmt: skip
         shown = [] if contacts is None else contacts.rows_to_show(own, time_s, FORGOTTEN_S)
         flights: dict[int, list[float]] = {}
         said: list[dict[str, Any]] = []
@@ -247,6 +269,11 @@ class Scope:
             "alerts": said,
             "area": area,
             "bands": _bands_at(bands, time_s),
+            "out": [
+                printable(name)
+                for name, longest_s in self._silence_s.items()
+                if time_s - heard.get(name, 0.0) > longest_s
+            ],
         }
 
     def camera(self, picture: dict[str, Any], time_s: float, chosen: int) -> dict[str, Any] | None:
@@ -342,15 +369,54 @@ def _flights(alerts: _Alerts) -> dict[int, list[float]]:
     return {int(t): flight for t, flight in zip(alerts.target, rounded, strict=True)}
 
 
-def _rules_of(simulation: Simulation) -> tuple[Configuration, Alerter] | None:
+def _shown(simulation: Simulation, platform: str | None) -> str:
+    """Return what carries a display: what is asked for, else what carries the console.
+
+    Empty where nothing is known to carry a block; `UsageError` for what carries none.
+    """
+    blocks = simulation.components.values()
+    known = sorted({one.context.platform for one in blocks} - {""})
+    if platform is not None and platform not in known:
+        raise UsageError(
+            f"--platform {platform!r}: nothing of this scene is carried by it"
+            f"{did_you_mean(platform, known)}"
+        )
+    consoles = [
+        one.context.platform
+        for one in blocks
+        if any(issubclass(output.message, Decisions) for output in one.outputs.values())
+    ]
+    first = [name for one in blocks for name in one.platforms()[:1] if name in known]
+    return platform or next(iter([*consoles, *first, *known]), "")
+
+
+def _rules_of(components: Mapping[str, Component]) -> tuple[Configuration, Alerter] | None:
     """Return the configuration and the alerter of the alerting block, if there is one."""
     from components.alert_configuration.conf_file import read_conf
 
-    for component in simulation.components.values():
+    for component in components.values():
         if any(issubclass(o.message, AlertLevels) for o in component.outputs.values()):
             configuration = read_conf(component.p.conf)
             return configuration, configuration.alerters[component.p.alerter - 1]
     return None
+
+
+def _longest_silence_s(simulation: Simulation) -> dict[str, float]:
+    """Return after which silence each sensor is out, s: those that are switched on at the start."""
+    scene, result = simulation.scene, dict[str, float]()
+    for name, component in sorted(simulation.components.items()):
+        sends = any(issubclass(o.message, Detections) for o in component.outputs.values())
+        if not sends or not getattr(component.p, "enabled", True):
+            continue
+        every = [
+            one.blocks[name].parameters for one in (scene, *(s.scene for s in scene.stretches))
+        ]
+        clocks = [clock for p in every if (clock := component.clock_of(p)) is not None]
+        if clocks:
+            slowest_s = max(float(1 / clock.rate_hz) for clock in clocks)
+            first_s = max(float(clock.offset_s) for clock in clocks)
+            result[name] = max(_SILENT_SCANS * slowest_s, _SILENT_S) + first_s
+    return result
 
 
 def _sensor(name: str, component: Component) -> dict[str, Any]:

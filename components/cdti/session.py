@@ -43,6 +43,7 @@ def run_session(
     host: str,
     port: int,
     units: str,
+    platform: str | None,
     no_wait: bool,
     no_figures: bool,
 ) -> None:
@@ -80,7 +81,7 @@ def run_session(
         say(f"{open_to}, and what is sent is not encrypted", err=True)
 
     def prepare(simulation: Simulation) -> None:
-        scope = Scope(simulation)
+        scope = Scope(simulation, platform)
         if simulation.recorder is not None:
             simulation.recorder.listeners.append(scope.listen)
         if console is not None:

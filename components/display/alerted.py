@@ -20,11 +20,12 @@ _MANOEUVRE: dict[str, Any] = {
 
 @dataclass
 class Alerted:
-    """When which target was alerted to at which level, and when the ownship was told to fly."""
+    """When which target was alerted to at which level, and when who was told to fly otherwise."""
 
     #: Target → level, and from when to when, s; of several alerting blocks the highest counts.
     stretches: dict[str, list[tuple[int, float, float]]] = field(default_factory=dict)
-    manoeuvres_s: FloatArray = field(default_factory=lambda: np.empty(0))
+    #: By platform, where there are several; else of the ownship, the empty name.
+    manoeuvres: dict[str, FloatArray] = field(default_factory=dict)
 
     @classmethod
     def read(cls, folder: Path) -> "Alerted":
@@ -33,10 +34,15 @@ class Alerted:
         run = RecordedTables(folder, {n: read_table(folder / f"{n}.parquet") for n in names})
         result = cls()
         if "manoeuvres" in names:
-            result.manoeuvres_s = np.unique(run.numbers("manoeuvres", "time_s"))
+            result.manoeuvres = _by_platform(run)
         if "alerts" in names and run.tables["alerts"].num_rows:
             result.stretches = _stretches(run)
         return result
+
+    @property
+    def manoeuvres_s(self) -> FloatArray:
+        """When any were told, s."""
+        return np.unique(np.concatenate([np.empty(0), *self.manoeuvres.values()]))
 
     @property
     def levels(self) -> list[int]:
@@ -53,7 +59,7 @@ class Alerted:
             line = Line2D([], [], color=colour, linewidth=width, label=f"alert {level}")
             line.set_solid_capstyle("butt")
             handles.append(line)
-        if len(self.manoeuvres_s):
+        if self.manoeuvres:
             handles.append(Line2D([], [], **_MANOEUVRE, label="manoeuvre"))
         return handles
 
@@ -61,6 +67,15 @@ class Alerted:
 def style_of(level: int) -> tuple[str, float]:
     """Return colour and width of an alert of a level."""
     return _LEVELS[min(level, len(_LEVELS)) - 1]
+
+
+def _by_platform(run: RecordedTables) -> dict[str, FloatArray]:
+    """Return the times of manoeuvres by whom they steer."""
+    time_s = run.numbers("manoeuvres", "time_s")
+    on = np.full(len(time_s), "", dtype=object)
+    if run.has("manoeuvres", "platform"):
+        on[:] = run.texts("manoeuvres", "platform")
+    return {name: np.unique(time_s[on == name]) for name in sorted(set(on.tolist()))}
 
 
 def _stretches(run: RecordedTables) -> dict[str, list[tuple[int, float, float]]]:
@@ -112,6 +127,6 @@ def draw_alerted_lines(
 
 
 def draw_manoeuvres(axes: Any, x: FloatArray, y: FloatArray) -> None:
-    """Mark where, or when, the ownship was commanded to manoeuvre."""
+    """Mark where, or when, an aircraft was told to fly otherwise."""
     if len(x):
         axes.plot(x, y, **_MANOEUVRE, zorder=3.2, scalex=False, scaley=False, clip_on=False)

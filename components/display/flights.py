@@ -102,6 +102,11 @@ class Flights:
             return nothing, nothing
         return self._map(target.at(time_s))
 
+    @property
+    def own_name(self) -> str:
+        """What other platforms call the ownship."""
+        return self._source.roster.own_name
+
     def ownship_position_at(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return east and north of the ownship in km at some times."""
         return self._map(self._source.own.at(time_s))

@@ -11,14 +11,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from components.display.summary import Columns, rows_by_name
-from components.flights.closest_approach import STEP_S, regular_count
 from components.messages.alerts import AlertLevels
 from components.messages.columns import ORIGIN, POSITION
 from components.messages.state_tracks import StateTracks, is_held
 from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates
-from components.metrics.losses import closest
-from components.metrics.separation import RelativeFlight
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -164,6 +161,13 @@ class ManoeuvreSummary:
 _BY_BLOCK = ("sensors", "tracks", "late_looks", "alerts", "manoeuvres")
 
 
+def carried_blocks(simulation: Simulation) -> dict[str, str]:
+    """Return what carries each block, the ownship's blocks first; nothing where one carries all."""
+    first = {name for one in simulation.components.values() for name in one.platforms()[:1]}
+    carried = simulation.platforms.items()
+    return dict(sorted(carried, key=lambda item: (item[1] not in first, item[1], item[0])))
+
+
 class PlatformSummary:
     """Says what each of several platforms carries, and its closest approaches as all flew."""
 
@@ -188,24 +192,10 @@ class PlatformSummary:
         }
 
     def _targets(self, platform: str) -> dict[str, Any]:
-        end_s = float(self._simulation.duration_s)
         for source in self._simulation.components.values():
-            if not isinstance(source, TrafficSource) or platform not in source.platforms()[1:]:
-                continue
-            viewer = source.roster.names.index(platform)
-            seen = [k for k in range(len(source.targets)) if k == viewer or k not in source.unseen]
-            count = regular_count(STEP_S, end_s)
-            flights = [RelativeFlight(source, k, STEP_S, count, end_s, viewer) for k in seen]
-            return {"targets": {flight.name: _approach(flight) for flight in flights}}
+            if isinstance(source, TrafficSource) and platform in source.platforms()[1:]:
+                return {"targets": source.approaches(platform)}
         return {}
-
-
-def _approach(flight: RelativeFlight) -> dict[str, Any]:
-    range_m, time_s, at = closest(flight)
-    if not np.isfinite(range_m):
-        return {"closest_approach": None}
-    cut = {"at": at} if at else {}
-    return {"closest_approach": {"time_s": time_s, "range_m": range_m, **cut}}
 
 
 def select_platform(summary: Mapping[str, Any], platform: str) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from components.display.map_view import (
     outline_of,
     reach_text,
 )
+from components.display.outcomes import carried_blocks
 from components.display.recorded_rows import Detected
 from components.display.symbols import (
     DENSE,
@@ -29,6 +30,7 @@ from components.display.symbols import (
     draw_marks,
     mark_of,
     name_lines,
+    platform_colours,
     set_time_axis,
     targets_key,
 )
@@ -58,7 +60,7 @@ def draw_plan(
     alerted: Alerted,
 ) -> Path:
     """Draw the plan view, with fields of view as the blocks have them, and write it as PNG."""
-    marks = positions(flights, detected)
+    marks, carrying = positions(flights, detected), carried_blocks(simulation)
     looks = {
         name: getattr(simulation.components.get(name), "stated_reach", None)
         for name in detected.sensors
@@ -86,14 +88,18 @@ def draw_plan(
         for name, outline in outlines.items():
             draw_outline(axes, outline, detected.styles, name, view.farthest_km)
         _draw_tracks(axes, view, flights)
-        above = {t.name: (t.time_s, t.east_km, t.north_km) for t in flights.targets}
+        own = {flights.own_name: flights.own}
+        tracks = {t.name: t for t in flights.targets} | own
+        above = {name: (t.time_s, t.east_km, t.north_km) for name, t in tracks.items()}
         draw_alerted_lines(axes, alerted, above)
-        draw_manoeuvres(axes, *flights.ownship_position_at(alerted.manoeuvres_s))
+        for name, when_s in alerted.manoeuvres.items():
+            draw_manoeuvres(axes, *flights.position_at(name or flights.own_name, when_s))
         drawn = {
             name: _draw_marks(axes, view, marks[name], detected.styles, name)
             for name in detected.sensors
         }
-        named = _draw_closest(axes, view, flights)
+        colours = platform_colours(carrying.values())
+        named = _draw_closest(axes, view, flights, colours)
         title = f"{figure_text(simulation.scene.title, 60)}: plan view"
         if named < flights.all_targets:
             title += f" ({named} nearest of {flights.all_targets:,} targets named"
@@ -107,14 +113,14 @@ def draw_plan(
         )
         px_per_s = MAP_WIDTH_IN * DPI / max(flights.duration_s, 1e-9)
         _draw_altitudes(heights, flights, marks, detected.styles, px_per_s)
-        beside = {t.name: (t.time_s, t.time_s, t.alt_m) for t in flights.targets}
+        beside = {name: (t.time_s, t.time_s, t.alt_m) for name, t in tracks.items()}
         draw_alerted_lines(heights, alerted, beside)
-        own = flights.own
-        when_s = alerted.manoeuvres_s
-        draw_manoeuvres(heights, when_s, np.interp(when_s, own.time_s, own.alt_m))
+        for name, when_s in alerted.manoeuvres.items():
+            if flown := tracks.get(name or flights.own_name):  # of very many some have no track
+                draw_manoeuvres(heights, when_s, np.interp(when_s, flown.time_s, flown.alt_m))
         texts = {name: reach_text(reach, mounted[name]) for name, reach in reaches.items()}
         dense = len(flights.targets) >= DENSE
-        handles = _legend(texts, detected, drawn, summary, dense)
+        handles = _legend(texts, detected, drawn, summary, carrying, dense)
         handles[4:4] = alerted.key()
         figure.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(right + 0.005, bottom + high),
@@ -208,15 +214,19 @@ def _draw_altitudes(
             draw_marks(axes, style, np.concatenate(points))
 
 
-def _draw_closest(axes: Any, view: MapView, flights: Flights) -> int:
-    """Mark closest approaches, name the nearest targets and return how many were named."""
+def _draw_closest(axes: Any, view: MapView, flights: Flights, colours: Mapping[str, str]) -> int:
+    """Mark closest approaches, name the nearest targets and return how many were named.
+
+    Platforms have colours, if there are several.
+    """
     from matplotlib.collections import LineCollection
 
     obstacles = np.concatenate(
         [np.column_stack((t.east_km, t.north_km)) for t in (flights.own, *flights.targets)]
     )
     labels = Labels(axes, view.x, view.y, view.km_per_px, obstacles)
-    labels.add("ownship", 0.0, 0.0, weight="bold")
+    own_colour = colours.get(flights.own_name, OWN)
+    labels.add("ownship", 0.0, 0.0, colour=own_colour, weight="bold")
     met = _nearest_first(flights)
     if met:
         there = np.array([[east, north] for _, _, _, east, north in met])
@@ -240,6 +250,8 @@ def _draw_closest(axes: Any, view: MapView, flights: Flights) -> int:
                 figure_text(track.name, 24),
                 float(track.east_km[seen[0]]),
                 float(track.north_km[seen[0]]),
+                colour=colours.get(track.name, "#000000"),
+                weight="bold" if track.name in colours else "normal",
             )
     if len(flights.targets) <= MOST_NAMED:
         for range_m, _, time_s, east, north in met:
@@ -262,7 +274,7 @@ def _nearest_first(flights: Flights) -> list[tuple[float, str, float, float, flo
 
 def _legend(
     reaches: dict[str, str], detected: Detected, drawn: dict[str, int], summary: dict[str, Any],
-    dense: bool,
+    carrying: Mapping[str, str], dense: bool,
 ) -> list[Any]:  # fmt: skip
     from matplotlib.lines import Line2D
 
@@ -277,6 +289,8 @@ def _legend(
         count = summary.get("sensors", {}).get(name, {}).get("detections")
         count = len(detected.time_s[name]) if count is None else count
         label = figure_text(name, 24)
+        if name in carrying:
+            label += f" on {figure_text(carrying[name], 16)}"
         text = f"{label}: {count:,} detections" if count else f"{label}: no detections"
         if drawn[name] < count:
             text += f"\n({drawn[name]:,} of them marked)"

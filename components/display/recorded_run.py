@@ -3,7 +3,7 @@
 import os
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 
 from components.messages.columns import POSE as POSE_COLUMNS
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.errors import UsageError
+from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.record.run_folder import Run, with_columns_of_rows
 from dsa_des.scene.examples import find_example
 
@@ -54,6 +54,31 @@ class RecordedTables:
     def has(self, table: str, *names: str) -> bool:
         """Whether there is a table with some columns."""
         return table in self.tables and {*names} <= {*self.table(table).column_names}
+
+    @cached_property
+    def carrying(self) -> dict[str, str]:
+        """What carries each block, the ownship's blocks first; nothing where one carries all."""
+        found = {
+            (on, block)
+            for name, table in self.tables.items()
+            if self.has(name, "block", "platform")
+            for block, on in _pairs(table)
+            if on is not None
+        }
+        flown = {*self.texts("truth", "target")} if self.has("truth", "target") else set()
+        in_order = sorted(found, key=lambda pair: (pair[0] in flown, pair))
+        return {block: on for on, block in in_order}
+
+    def seen_from(self, platform: str) -> "RecordedTables":
+        """Return what one of several platforms has: it is the ownship, which takes its place."""
+        names = list(dict.fromkeys(self.carrying.values()))
+        if platform not in names:
+            raise UsageError(
+                f"{self.folder}: --platform {platform!r}: nothing of this run is carried by it"
+                f"{did_you_mean(platform, names)}"
+            )
+        return replace(self, tables={n: _on(n, t, platform, names[0]) for n, t in
+                                     self.tables.items()}, _kept={})  # fmt: skip
 
     @cached_property
     def _with_pose(self) -> Any:
@@ -148,6 +173,28 @@ class RecordedTables:
         if columns.column_names.count(name) != 1:
             raise UsageError(f"{self.folder}: {table}.parquet: there is no column {name!r}")
         return columns[name]
+
+
+def _pairs(table: Any) -> set[tuple[str, str | None]]:
+    """Return which blocks have rows in a table, each with what carries it."""
+    rows = table.select(["block", "platform"]).group_by(["block", "platform"]).aggregate([])
+    return {(row["block"], row["platform"]) for row in rows.to_pylist()}
+
+
+def _on(name: str, table: Any, platform: str, first: str) -> Any:
+    """Return a table's rows of blocks on a platform; of the truth all, as seen from it."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    if name == "truth":
+        if platform == first:
+            return table
+        flown = [first if of is None else of for of in table["target"].to_pylist()]
+        seen = pa.array([None if of == platform else of for of in flown], pa.string())
+        return table.set_column(table.column_names.index("target"), "target", seen)
+    if "platform" not in table.column_names:
+        return table
+    return table.filter(pc.equal(table["platform"].cast(pa.string()), platform))
 
 
 def tables_of(run: Run | str | os.PathLike[str]) -> RecordedTables:

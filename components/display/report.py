@@ -6,7 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from components.display.outcomes import PlatformSummary, outcome_observers, senders
+from components.display.outcomes import (
+    PlatformSummary,
+    carried_blocks,
+    outcome_observers,
+    senders,
+)
 from components.display.summary import FusedSummary, SensorSummary
 from components.messages.detections import Detections
 from dsa_des.record.sinks import Observer
@@ -77,7 +82,8 @@ class DetectAndSenseReport:
 
         flights = Flights.from_simulation(simulation, summary)
         detected = Detected.read(folder, sensor_names(simulation))
-        detected.styles = styles_of(detected.sensors, simulation.components)
+        carrying = carried_blocks(simulation)
+        detected.styles = styles_of(detected.sensors, simulation.components, carrying)
         alerted = Alerted.read(folder)
         paths = []
         if flights is not None:

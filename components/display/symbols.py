@@ -29,6 +29,8 @@ _SPACING_PX, _MOST_MARKS = 9.0, 5000
 #: of a light colour the other way round.
 _SHADES = (0.0, 0.4, -0.35)
 _LIGHT = 0.25
+#: What is on board of each of several platforms, the ownship's first: told apart also without hues.
+_PLATFORMS = ("#0072B2", "#D55E00", "#009E73", "#7B3294", "#8C6D00", "#3A3A3A")
 _KINDS = (
     ("radar", RADAR), ("laser", LASER), ("optical.ir", IR), ("optical", EO),
     ("surveillance", COOPERATIVE), ("tracking", TRACKER), ("fusion", FUSION),
@@ -42,9 +44,33 @@ _NAME_PT = FONT_SIZE - 1
 Box = tuple[float, float, float, float]
 
 
-def styles_of(names: Iterable[str], blocks: Mapping[str, Any]) -> dict[str, Mark]:
-    """Return name → mark of sensors by the classes of a run's blocks, alike in every figure."""
-    return marks_of({name: type(blocks[name]) if name in blocks else None for name in names})
+def styles_of(
+    names: Iterable[str], blocks: Mapping[str, Any], carrying: Mapping[str, str] | None = None
+) -> dict[str, Mark]:
+    """Return name → mark of sensors by the classes of a run's blocks, alike in every figure.
+
+    Where several platforms are `carrying` blocks, the colour is that of the platform.
+    """
+    classes = {name: type(blocks[name]) if name in blocks else None for name in names}
+    carrying = carrying or {}
+    return in_colours(marks_of(classes), carrying, platform_colours(carrying.values()))
+
+
+def platform_colours(platforms: Iterable[str]) -> dict[str, str]:
+    """Return the colour of each of several platforms, in their order; nothing of one alone."""
+    names = list(dict.fromkeys(platforms))
+    colours = {name: _PLATFORMS[k % len(_PLATFORMS)] for k, name in enumerate(names)}
+    return colours if len(names) > 1 else {}
+
+
+def in_colours(
+    marks: Mapping[str, Mark], carrying: Mapping[str, str], colours: Mapping[str, str]
+) -> dict[str, Mark]:
+    """Return marks of blocks in the colours of what is `carrying` them, as far as there are any."""
+    return {
+        name: replace(mark, colour=colours.get(carrying.get(name, ""), mark.colour))
+        for name, mark in marks.items()
+    }
 
 
 def mark_of(style: Mark) -> dict[str, Any]:

@@ -7,13 +7,15 @@ from typing import Any
 
 from components.embedding.host_traffic import HostTraffic, HostTrafficParameters, Plane
 from components.messages.targets import TrafficStates
-from dsa_des.block.component import Component
+from dsa_des.block.component import Component, Context
 from dsa_des.block.registry import UnknownType, find
-from dsa_des.errors import Problem, SceneError, UsageError
+from dsa_des.errors import Problem, SceneError, UsageError, did_you_mean
 from dsa_des.scene.block_table import Block
 from dsa_des.scene.examples import find_input_file
+from dsa_des.scene.platforms import platforms_of
 from dsa_des.scene.scene import Scene, load_tables
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
+from dsa_des.time.randomness import Streams
 
 HOST = "traffic.host"
 #: What the source is called in a scene that has none; its wires then name it so.
@@ -26,17 +28,50 @@ def load_for_host(
     sets: Iterable[str] = (),
     swaps: Iterable[str] = (),
     seed: int | None = None,
+    platform: str | None = None,
 ) -> Scene:
-    """Return a scene, from a file or as it is, that has a traffic block; SceneError, UsageError."""
+    """Return a scene, from a file or as it is, that has a traffic block; SceneError, UsageError.
+
+    Of several platforms' chains only that of the one that the host's ownship is.
+    """
     if isinstance(scene, Scene):
         if tuple(sets) or tuple(swaps):
             raise UsageError("sets and swaps change a scene while it is loaded: give its file")
-        return scene if seed is None else replace(scene, seed=seed)
+        loaded = scene if seed is None else replace(scene, seed=seed)
+    else:
+        loaded = _loaded(scene, sets=sets, swaps=swaps, seed=seed)
+    return loaded if platform is None else _on_board(loaded, platform)
+
+
+def _loaded(
+    scene: Path | str, *, sets: Iterable[str], swaps: Iterable[str], seed: int | None
+) -> Scene:
     scene_file = read_scene_file(find_input_file(scene, "scene"))
     blocks = scene_file.data.get("blocks", {})
     if isinstance(blocks, dict) and _NAME not in blocks and not _has_traffic(scene_file):
         blocks[_NAME] = {"type": HOST}
     return load_tables(scene_file, sets=sets, swaps=swaps, seed=seed)
+
+
+def _on_board(scene: Scene, platform: str) -> Scene:
+    """Return a scene with the blocks on one platform alone, for which it is the ownship."""
+    name = source_of(scene)
+    block = scene.blocks[name]
+    context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
+    names = block.cls(name, block.parameters, context).platforms()
+    carrying = platforms_of(scene, {name: names}) if names else {}
+    known = sorted({*carrying.values()})
+    if platform not in known:
+        message = f"nothing of this scene is carried by {platform!r}{did_you_mean(platform, known)}"
+        raise SceneError([Problem(str(scene.path), "platform", message)])
+    kept = {name, *(one for one, on in carrying.items() if on == platform)}
+    blocks = {
+        one: replace(of, options=of.options.model_copy(update={"platform": None}))
+        for one, of in scene.blocks.items()
+        if one in kept
+    }
+    wires = [wire for wire in scene.wires if {wire.source, wire.target} <= kept]
+    return replace(scene, blocks=blocks, wires=wires, graph=scene.graph.subgraph(kept).copy())
 
 
 def _has_traffic(scene_file: SceneFile) -> bool:

@@ -46,6 +46,9 @@ class Simulator:
     beyond_fusion : bool
         Whether to run also what the answer does not rest on, such as a tracker behind the fusion;
         its messages are then in `Result.messages`.
+    platform : str, optional
+        Of a scene in which several aircraft or places carry a chain, the one that the host's
+        ownship is; the blocks of others are left out.
 
     Raises
     ------
@@ -62,8 +65,9 @@ class Simulator:
         swaps: Iterable[str] = (),
         seed: int | None = None,
         beyond_fusion: bool = False,
+        platform: str | None = None,
     ) -> None:
-        self.scene = load_for_host(scene, sets=sets, swaps=swaps, seed=seed)
+        self.scene = load_for_host(scene, sets=sets, swaps=swaps, seed=seed, platform=platform)
         self._source = source_of(self.scene)
         refuse_other_instants(self.scene)
         self._planes = planes_in_scene(self.scene)

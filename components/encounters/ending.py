@@ -1,14 +1,16 @@
 """The end of an encounter: all aircraft have passed, and the run need not go on."""
 
 from fractions import Fraction
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
-from components.geometry import slant_range_m
+from components.geometry import POSITION_FIELDS, slant_range_m
 from components.messages.reach import FarthestLook
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.keyed_table import KeyedTable
+from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.block.component import (
     ClockedParameters,
     Component,
@@ -35,6 +37,9 @@ class ClosestApproachPassedParameters(ClockedParameters):
     beyond_m: float = Field(
         default=0.0, ge=0, description="Distances from which on an aircraft counts as passed, m."
     )
+    between: Literal["ownship and others", "any two"] = Field(
+        default="ownship and others", description="Whose distances are taken."
+    )
 
 
 class ClosestApproachPassed(Component):
@@ -44,7 +49,8 @@ class ClosestApproachPassed(Component):
     compared with that of the look before. An aircraft has passed when it is at least `beyond_m`
     away and its range has grown from look to look for `after_s`. One that has been there and is
     gone counts as one that moves away; one that has not come yet has not passed. The run ends at
-    the first look at which all have passed: that instant is no longer part of it.
+    the first look at which all have passed: that instant is no longer part of it. Between any two,
+    each has to have passed all others.
     """
 
     inputs = {"states": Input(TrafficStates, "sampled", "Where all aircraft are.")}
@@ -72,11 +78,7 @@ class ClosestApproachPassed(Component):
         states = wake["states"]
         if states is None or len(states.columns) == 0:
             return None
-        own = states.own_lat_deg, states.own_lon_deg, states.own_alt_m
-        lat_deg, lon_deg, alt_m = (values[:, np.newaxis] for values in own)
-        range_m = slant_range_m(
-            lat_deg, lon_deg, alt_m, states.lat_deg, states.lon_deg, states.alt_m
-        )
+        range_m, present = self._ranges_m(states)
         starts = wake.instants.first_of_each
         numbers = wake.run[starts]
         shape = range_m.shape[1], len(numbers)
@@ -93,16 +95,16 @@ class ClosestApproachPassed(Component):
         counts = np.diff(np.append(starts, len(wake)))
         first = np.repeat(starts, counts)[:, np.newaxis]
 
-        there = np.where(states.present, row, -1)
+        there = np.where(present, row, -1)
         before = np.where(known.seen.T, row[starts], -1)
         there[starts] = np.maximum(there[starts], before)
         seen = np.maximum.accumulate(there, axis=0) >= first
 
         last_m = np.empty_like(range_m)
-        now_m = np.where(states.present, range_m, np.inf)
+        now_m = np.where(present, range_m, np.inf)
         last_m[1:] = now_m[:-1]
         last_m[starts] = known.range_m.T
-        growing = (now_m > last_m) | (~states.present & seen)
+        growing = (now_m > last_m) | (~present & seen)
         shrank = np.maximum.accumulate(np.where(growing, -1, row), axis=0)
         remembered = np.repeat(known.since.T, counts, axis=0)
         since = np.where(shrank >= first, ticks[np.maximum(shrank, 0), 0], remembered)
@@ -114,3 +116,15 @@ class ClosestApproachPassed(Component):
         newer = KeyedTable(replica=numbers, **now)
         self._known = self._known.replace_runs(numbers, newer, wake.first_run)
         return RunEnd(wake.ticks[over], run=wake.run[over]) if over.any() else None
+
+    def _ranges_m(self, states: TrafficStates) -> tuple[FloatArray, BoolArray]:
+        """Return the distances that are taken at every row, and whether both aircraft are there."""
+        own = [getattr(states, f"own_{name}")[:, np.newaxis] for name in POSITION_FIELDS]
+        others = [getattr(states, name) for name in POSITION_FIELDS]
+        if self.p.between != "any two":
+            return slant_range_m(*own, *others), states.present
+        every = [np.concatenate(pair, axis=1) for pair in zip(own, others, strict=True)]
+        one, two = np.triu_indices(every[0].shape[1], 1)
+        there = np.insert(states.present, 0, True, axis=1)
+        ends = (part[:, which] for which in (one, two) for part in every)
+        return slant_range_m(*ends), there[:, one] & there[:, two]

@@ -7,7 +7,7 @@ class of its geometry. The ratios themselves are taken over all runs of a cell.
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -120,7 +120,8 @@ class RiskRatioParameters(RiskParameters):
 class RiskRatios(Mitigated):
     """Risk ratios of NMAC and of loss of well clear, with the flags that they are made of."""
 
-    Parameters = RiskRatioParameters
+    Parameters: ClassVar[Any] = RiskRatioParameters
+    of_any_two = False
     geometry = (
         "closest_s", "horizontal_miss_m", "vertical_miss_m", "relative_speed_mps", "foreseen_s",
         "course_along", "course_across", "bearing_ahead", "bearing_right",

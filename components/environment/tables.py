@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from components.atmosphere.pressure_altitude import STANDARD_HPA
 from components.environment.weather_cells import WeatherCell
 from components.terrain.raster import RasterFile
+from components.terrain.reflection import surface_permittivity
 from dsa_des.block.component import Parameters
 from dsa_des.time.gauss_markov import LONGEST_S
 
@@ -204,6 +205,34 @@ class Terrain(Parameters):
         description="Standard deviation of the ground's own range rates, m/s: about 0.3 wooded "
         "hills in a fresh wind, 1 sea (Skolnik, table 3.1); for moving-target filters.",
     )
+    facet_slope_deg: float | None = Field(
+        default=None,
+        gt=0,
+        le=45,
+        description="Slope of the ground's facets, deg: those that lie level mirror what sidelobes "
+        "send straight down, about 5 a calm sea, 15 a rough one or land (assumption). Without it "
+        "there is no such altitude line.",
+    )
+    roughness_m: float | None = Field(
+        default=None,
+        ge=0,
+        le=100,
+        description="Standard deviation of the ground's heights, m: with it flat ground or sea "
+        "mirrors rays, which gives radars lobes; 0 for a mirror. Without it there is no such ray.",
+    )
+    relative_permittivity: float = Field(
+        default=15.0,
+        ge=1,
+        le=200,
+        description="Relative permittivity of the ground: about 70 sea, 25 wet, 15 medium and 3 "
+        "dry ground (ITU-R P.527); for roughness_m and facet_slope_deg.",
+    )
+    conductivity_s_m: float = Field(
+        default=0.0,
+        ge=0,
+        le=100,
+        description="Conductivity of the ground, S/m: about 5 sea, 0.005 to 0.1 ground.",
+    )
     clutter_mean: Literal["constant", "fluctuating"] = Field(
         default="fluctuating",
         description="Whether the clutter's mean fluctuates from look to look (thesis §5.3.2).",
@@ -231,6 +260,12 @@ class Terrain(Parameters):
         "where altitudes are above the ellipsoid.",
     )
 
+    def permittivity(self, wavelength_m: float | None) -> complex:
+        """Return the ground's complex relative permittivity; real where no wavelength is given."""
+        return surface_permittivity(
+            self.relative_permittivity, self.conductivity_s_m, wavelength_m or 0.0
+        )
+
     def ground_m(self, lat_deg: float, lon_deg: float) -> float | None:
         """Return the height of the ground above the ellipsoid; None where none is known."""
         if self.raster is None:
@@ -250,6 +285,10 @@ class Terrain(Parameters):
                 f"{self.raster.raster.name} are filled from around them"
             )
         if self.height_m is None:
-            clutter = "clutter_gamma_db", "clutter_motion_m_s", "clutter_mean"
-            said += self.idle(*clutter, because="height_m is not given")
+            keys = "clutter_gamma_db", "clutter_motion_m_s", "clutter_mean"
+            mirrors = "facet_slope_deg", "roughness_m"
+            said += self.idle(*keys, *mirrors, because="height_m is not given")
+        if self.facet_slope_deg is None and self.roughness_m is None:
+            water = "relative_permittivity", "conductivity_s_m"
+            said += self.idle(*water, because="roughness_m and facet_slope_deg are not given")
         return said

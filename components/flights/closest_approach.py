@@ -238,10 +238,14 @@ def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: Fl
 
 
 def censored_approaches(
-    source: Any, compared_at: Sequence[SampleTimes], time_s: FloatArray, end_s: float
+    own: Trajectory,
+    targets: Fleet,
+    compared_at: Sequence[SampleTimes],
+    time_s: FloatArray,
+    end_s: float,
 ) -> list[str]:
     """Say of each closest approach whether it is at an end of what was looked at."""
-    present_s = np.array(present_together_s(source.own, source.targets.intervals_present_s, end_s))
+    present_s = np.array(present_together_s(own, targets.intervals_present_s, end_s))
     looked_s = np.array(_sample_span_s(compared_at, *present_s))
     return [
         end_of_look(time, looked_s[:, number], present_s[:, number], end_s)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from components.geometry import TrajectoryState
 from dsa_des.arrays.column_values import constant
+from dsa_des.arrays.growing import Growing
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 CELLS_AT_ONCE = 8192
@@ -118,7 +119,7 @@ def assemble_rows(rows: Sequence[IntArray], states: Sequence[TrajectoryState]) -
 _FEW_STEPS = 3
 
 
-class PieceSearch:
+class PieceSearch(Growing):
     """The pieces of many paths, laid end to end."""
 
     def __init__(self, starts_s: FloatArray, counts: IntArray) -> None:
@@ -144,6 +145,15 @@ class PieceSearch:
         """Return the search among the pieces of each."""
         counts = np.array([len(starts) for starts in starts_s], dtype=np.int64)
         return cls(np.concatenate([*starts_s, np.empty(0)]), counts)
+
+    def with_paths(self, more: PieceSearch) -> PieceSearch:
+        """Return the search among these and more paths at their end."""
+        before = len(self.starts_s)
+        both = self.with_more(
+            starts_s=more.starts_s, first=more.first + before, last=more.last + before
+        )
+        both._steps, both._per_s = max(self._steps, more._steps), None
+        return both
 
     def __call__(self, aircraft: IntArray, time_s: FloatArray) -> IntArray:
         """Return the last piece that starts at or before a time, or the first one."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
+from functools import cached_property
 from math import atan2, cos, inf, isnan, radians
 from typing import Any
 
@@ -17,6 +17,7 @@ from components.flights.scripted_flights import MOST_ALT_M, ScriptedFleet, Scrip
 from components.flights.steering_plan import SteeredPart, chords, steered_parts, times_around_s
 from components.geometry import TrajectoryState, heading_from_deg, wrap_longitude_deg
 from components.messages.steering import Manoeuvre
+from dsa_des.arrays.growing import Growing
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -84,7 +85,7 @@ def straight_fleet(
 Parts = tuple[tuple[float, ScriptedTrajectory], ...]
 
 
-class SteeredFleet(Fleet):
+class SteeredFleet(Growing, Fleet):
     """Ownships, each with its own flight, and after manoeuvres with what each of them led to.
 
     A manoeuvre replaces only its own part: a climb lets a turn in progress go on, and a turn a
@@ -103,10 +104,12 @@ class SteeredFleet(Fleet):
         flown = [flight for of_one in parts for _, flight in of_one]
         self._parts = ScriptedFleet(flown)
         #: Each part with its plan; None of those on a ramp.
-        self._flown: list[SteeredPart | None] = [
-            one if isinstance(one, SteeredPart) else None for one in flown
-        ]
-        #: Of each ownship: when its parts begin, in order, and which they are.
+        self._flown = np.array(
+            [one if isinstance(one, SteeredPart) else None for one in flown], dtype=object
+        )
+        #: Of each ownship: when its parts begin, in order, and which they are. Fleets that came of
+        #: this one write theirs behind them; how many have, and which of them this one is.
+        self._written, self._version = [0], 0
         room = len(flights), int(self.manoeuvre_count.max(initial=0)) + 1
         self._start_s, self._part = np.full(room, np.inf), np.zeros(room, dtype=np.int64)
         there = np.arange(room[1]) < self.manoeuvre_count[:, np.newaxis]
@@ -130,6 +133,20 @@ class SteeredFleet(Fleet):
         starts_s, numbers = self._start_s[ownship, :count], self._part[ownship, :count]
         flown = (self._flown[n] or self._parts[n] for n in numbers.tolist())
         return tuple(zip(starts_s.tolist(), flown, strict=True))
+
+    def subset(self, columns: IntArray) -> SteeredFleet:
+        """Return the fleet of some flights, in any order, without preparing them anew."""
+        if np.array_equal(columns, np.arange(len(self))):
+            return self
+        flights = self._flights
+        if isinstance(flights, ScriptedFleet):
+            some = SteeredFleet(flights.subset(columns))
+        else:
+            some = SteeredFleet(fleet_of([flights[number] for number in columns.tolist()]))
+        some._parts, some._flown = self._parts, self._flown
+        for name in ("manoeuvre_count", "_start_s", "_part"):
+            setattr(some, name, getattr(self, name)[columns])
+        return some
 
     def each(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
@@ -158,19 +175,30 @@ class SteeredFleet(Fleet):
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None
     ) -> tuple[IntArray, IntArray, IntArray]:
         """Return which (n,) are before their first manoeuvre, which after, and in which part."""
-        if not self._flown:
+        if not len(self._flown):
             return np.arange(len(time_s)), _NOBODY, _NOBODY
-        part = (self._start_s.take(aircraft, axis=0) <= time_s[:, np.newaxis]).sum(axis=1)
+        count = self.manoeuvre_count.take(aircraft)
         if known is not None:
-            part = np.minimum(part, known)
+            count = np.minimum(count, known)
+        # Most ask for the last part.
+        begun = self._start_s[aircraft, np.maximum(count - 1, 0)] <= time_s
+        part = np.where(begun, count, 0)
+        early = (~begun & (count > 0)).nonzero()[0]
+        if len(early):
+            starts_s = self._start_s.take(aircraft[early], axis=0)
+            earlier = (starts_s <= time_s[early, np.newaxis]).sum(axis=1)
+            part[early] = np.minimum(earlier, count[early])
         after = part.nonzero()[0]
         own = _NOBODY if len(after) == len(part) else np.flatnonzero(part == 0)
         return own, after, self._part[aircraft[after], part[after] - 1]
 
-    @property
+    @cached_property
     def max_speeds_mps(self) -> FloatArray:
         """Largest speed of each along its path as it is now, shape (flights,)."""
-        return np.array([flight.max_speed_mps for flight in self], dtype=np.float64)
+        every = np.arange(len(self))
+        return np.maximum(
+            self._flights.max_speeds_mps, self.largest_speed(every, np.full(len(self), inf))
+        )
 
     def ground_speeds_mps(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
@@ -193,10 +221,12 @@ class SteeredFleet(Fleet):
 
     def largest_speed(self, ownship: IntArray, time_s: FloatArray) -> FloatArray:
         """Return the largest speed of any manoeuvre begun by ownships (n,) by times (n,), or 0."""
-        if not self._flown:
+        if not len(self._flown):
             return np.zeros(len(ownship))
-        speeds = self._parts.max_speeds_mps[self._part[ownship]]
-        begun = self._start_s[ownship] <= time_s[:, np.newaxis]
+        parts = int(self.manoeuvre_count.max())
+        speeds = self._parts.max_speeds_mps[self._part[ownship, :parts]]
+        begun = self._start_s[ownship, :parts] <= time_s[:, np.newaxis]
+        begun &= np.arange(parts) < self.manoeuvre_count[ownship, np.newaxis]
         return np.asarray(np.where(begun, speeds, 0.0).max(axis=1))
 
     def add_manoeuvres(
@@ -272,17 +302,22 @@ class SteeredFleet(Fleet):
         flown: Sequence[SteeredPart | None],
     ) -> SteeredFleet:
         """Return the flights with a new part of each of some ownships from times on."""
-        fleet = copy(self)
+        fleet = self.with_more(_flown=np.array(flown, dtype=object))
+        fleet.__dict__.pop("max_speeds_mps", None)
         fleet._parts = self._parts.with_flights(new)
         index = self.manoeuvre_count[ownship]
-        room = len(self), int(int(index.max()) + 2 > self._start_s.shape[1])
-        fleet._start_s = np.concatenate([self._start_s, np.full(room, np.inf)], axis=1)
-        fleet._part = np.concatenate([self._part, np.zeros(room, dtype=np.int64)], axis=1)
+        wide = self._start_s.shape[1]
+        if self._written[0] != self._version or int(index.max()) >= wide:
+            # Another one has written there, or there is no room.
+            shape, fleet._written = (len(self), 2 * wide), [0]
+            fleet._start_s, fleet._part = np.full(shape, np.inf), np.zeros(shape, dtype=np.int64)
+            fleet._start_s[:, :wide], fleet._part[:, :wide] = self._start_s, self._part
+        fleet._written[0] += 1
+        fleet._version = fleet._written[0]
         fleet._start_s[ownship, index] = time_s
         fleet._part[ownship, index] = len(self._flown) + np.arange(len(new))
         fleet.manoeuvre_count = self.manoeuvre_count.copy()
         fleet.manoeuvre_count[ownship] += 1
-        fleet._flown = [*self._flown, *flown]
         return fleet
 
 
@@ -312,7 +347,7 @@ class SteeredFlight:
     @property
     def max_speed_mps(self) -> float:
         """Largest speed along the path as it is now."""
-        return max(flight.max_speed_mps for flight in (self.flight, *(f for _, f in self.parts)))
+        return float(self._fleet.max_speeds_mps[self._number])
 
     def interval_present(self) -> tuple[float, float]:
         """Return from when to when it is there: from 0 on, as what is flown has no end."""
@@ -388,6 +423,9 @@ class MixedFleet(Fleet):
 
 
 def _join_flights(flights: Sequence[SteeredFlight]) -> SteeredFleet:
+    fleet = flights[0]._fleet
+    if all(flight._fleet is fleet for flight in flights):
+        return fleet.subset(np.array([flight._number for flight in flights]))
     return SteeredFleet(fleet_of([f.flight for f in flights]), [f.parts for f in flights])
 
 

@@ -297,14 +297,15 @@ class SampledFleet(Fleet):
         places = [flight.place for flight in self._flights]
         table = places[0][0] if places and places[0] is not None else None
         if table is None or any(place is None or place[0] is not table for place in places):
-            table, end = _side_by_side([flight.coefficients for flight in self._flights]), 0
-            for flight in self._flights:
+            each = list({id(flight): flight for flight in self._flights}.values())
+            table, end = _side_by_side([flight.coefficients for flight in each]), 0
+            for flight in each:
                 start, end = end, end + len(flight.sample_times_s)
                 flight.coefficients = table[start:end, : len(flight.coefficients)].T
                 flight.place = table, start
-            return table, None
-        starts = [place[1] for place in places if place is not None]
-        return table, np.array(starts, dtype=np.int64) - self._find.first
+        starts = [flight.place[1] for flight in self._flights if flight.place is not None]
+        later = np.array(starts, dtype=np.int64) - self._find.first
+        return table, later if later.any() else None
 
     @cached_property
     def _away_segments(self) -> BoolArray | None:

@@ -27,7 +27,8 @@ from components.geometry import (
     heading_from_deg,
     wrap_longitude_deg,
 )
-from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.arrays.growing import Growing, GrowingArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 LONGEST_FLIGHT_S = 1e12
 """Flights are held up to here (30,000 years) and stand still after, so that nothing overflows."""
@@ -157,7 +158,11 @@ class ScriptedTrajectory:
         return self.start_time_s, self.end_time_s
 
 
-class ScriptedFleet(Fleet):
+#: Columns of a fleet that are those of its parts one after the other.
+_GROWING = ("_names", "_between_s", "_until_s", "_fixed_rad", "_counts", "_legs", "_kind")
+
+
+class ScriptedFleet(Growing, Fleet):
     """Scripted flights: columns over flights, and over all their legs laid end to end."""
 
     def __init__(self, flights: Sequence[ScriptedTrajectory]) -> None:
@@ -178,10 +183,13 @@ class ScriptedFleet(Fleet):
         Fixed angles (3, flights) are NaN where the motion gives them; the table of each kind of
         legs holds those of that kind, in their order.
         """
-        self._names, self._between_s, self._fixed_rad = names, between_s, fixed_rad
+        self._names = np.array(names, dtype=object)
+        self._between_s, self._fixed_rad = between_s, fixed_rad
         self._some_fixed = not np.isnan(fixed_rad).all()
         self._until_s = np.minimum(between_s[1], between_s[0] + LONGEST_FLIGHT_S)
-        self._counts, self._legs, self._kind, self._tables = counts, legs, kinds, tables
+        self._counts, self._legs, self._kind = counts, legs, kinds
+        #: Of each kind, the rows of a leg beside each other in memory: some legs are taken at once.
+        self._tables = {kind: GrowingArray(np.asfortranarray(of)) for kind, of in tables.items()}
         self._find = PieceSearch(legs[0], counts)
         self._slot = np.empty(len(kinds), dtype=np.int64)
         for kind in tables:
@@ -199,17 +207,32 @@ class ScriptedFleet(Fleet):
 
     def with_flights(self, flights: ScriptedFleet) -> ScriptedFleet:
         """Return a fleet with more flights at its end; neither is a subset."""
-        pairs = zip(self._all_columns(), flights._all_columns(), strict=True)
-        columns = [np.concatenate(both, axis=-1) for both in pairs]
-        mine, others = self._tables, flights._tables
-        tables = {
-            kind: np.concatenate([of[kind] for of in (mine, others) if kind in of], axis=-1)
-            for kind in sorted({*mine, *others})
-        }
-        return self.of_columns([*self._names, *flights._names], *columns, tables)
+        sizes = {kind: table.values.shape[1] for kind, table in self._tables.items()}
+        slot = flights._slot.copy()
+        for kind in flights._tables:
+            slot[flights._kind == kind] += sizes.get(kind, 0)
+        fleet = self.with_more(
+            _slot=slot,
+            _columns=flights._columns + len(self._names),
+            **{name: getattr(flights, name) for name in _GROWING},
+        )
+        fleet._forget()
+        fleet._find = self._find.with_paths(flights._find)
+        fleet._some_fixed = self._some_fixed or flights._some_fixed
+        fleet._tables = {**flights._tables, **self._tables}
+        for kind in sizes.keys() & flights._tables.keys():
+            more = flights._tables[kind].values
+            fleet._tables[kind] = self._tables[kind].with_more(more)
+        return fleet
 
-    def _all_columns(self) -> tuple[AnyArray, ...]:
-        return self._between_s, self._fixed_rad, self._counts, self._legs, self._kind
+    def _forget(self) -> None:
+        """Forget what is worked out of all flights: they are others now."""
+        for name in ("_parts", "max_speeds_mps"):
+            self.__dict__.pop(name, None)
+
+    def _table(self, kind: int, slot: IntArray) -> FloatArray:
+        """Return the table (rows, n) of legs of a kind."""
+        return np.ascontiguousarray(self._tables[kind].values.T.take(slot, axis=0).T)
 
     def ramp_velocities_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
         """Return velocities east and north (2, n), asked for as in `each`, where flights are on a
@@ -219,14 +242,14 @@ class ScriptedFleet(Fleet):
         velocity = np.full((2, len(leg)), np.nan)
         on = np.flatnonzero(self._kind[leg] == _RAMP)
         if len(on):
-            table = self._tables[_RAMP].take(self._slot[leg[on]], axis=1)
+            table = self._table(_RAMP, self._slot[leg[on]])
             velocity[:, on] = ramp_velocity(table, elapsed[on])
         return velocity
 
     def subset(self, columns: IntArray) -> ScriptedFleet:
         """Return the fleet of some flights, without preparing them anew."""
         fleet = copy(self)
-        fleet.__dict__.pop("_parts", None)
+        fleet._forget()
         fleet._columns = self._columns[columns]
         return fleet
 
@@ -240,13 +263,13 @@ class ScriptedFleet(Fleet):
         segments = []
         for leg, (start_s, *others) in legs:
             kind = int(self._kind[leg])
-            table = self._tables[kind][:, self._slot[leg]].copy()
+            table = self._tables[kind].values[:, self._slot[leg]].copy()
             segments.append(Segment(KINDS[kind], start_s, table, *others))
         fixed = tuple(None if isnan(a) else a for a in self._fixed_rad[:, number].tolist())
         between_s = self._between_s[:, number].tolist()
         return ScriptedTrajectory.of_segments(self._names[number], segments, fixed, *between_s)
 
-    @property
+    @cached_property
     def max_speeds_mps(self) -> FloatArray:
         """Largest speed of each along its path, shape (flights,)."""
         if not len(self._names):
@@ -295,13 +318,12 @@ class ScriptedFleet(Fleet):
         in_use = np.flatnonzero(np.bincount(kinds)).tolist()
         if len(in_use) == 1:
             kind = in_use[0]
-            lat, lon, alt, yaw = _BY_KIND[kind](self._tables[kind].take(slot, axis=1), elapsed)
+            lat, lon, alt, yaw = _BY_KIND[kind](self._table(kind, slot), elapsed)
         else:
             lat, lon, alt, yaw = moved = tuple(np.empty(len(leg)) for _ in range(4))
             for kind in in_use:
                 chosen = np.flatnonzero(kinds == kind)
-                table = self._tables[kind].take(slot[chosen], axis=1)
-                values = _BY_KIND[kind](table, elapsed[chosen])
+                values = _BY_KIND[kind](self._table(kind, slot[chosen]), elapsed[chosen])
                 for out, value in zip(moved, values, strict=True):
                     out[chosen] = value
         pitch, roll = self._legs[1].take(leg), self._legs[2].take(leg)
@@ -344,7 +366,7 @@ class ScriptedFleet(Fleet):
                 FormulaGroup(
                     _BY_KIND[kind],
                     members,
-                    self._tables[kind].take(self._slot[legs], axis=1)[:, np.newaxis],
+                    self._table(kind, self._slot[legs])[:, np.newaxis],
                     (self._between_s[0][of], self._between_s[1][of], self._until_s[of]),
                     np.where(np.isnan(fixed), derived, fixed),
                     ~np.isnan(fixed[0]),

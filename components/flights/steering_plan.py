@@ -311,25 +311,23 @@ class _Start(NamedTuple):
 #: A study's metrics fly again what its runs flew.
 _KNOWN: dict[_Start, SteeredPart] = {}
 _MOST_KNOWN = 4096
+_FEW = 2
 
 
 def _fly_plans(starts: Sequence[_Start]) -> list[SteeredPart]:
     """Return what is flown from some places on, each as its script would be by itself."""
-    if not starts:
-        return []
     legs = [start.plan.legs() for start in starts]
-    headings = np.array([heading_from_deg(start.heading_deg) for start in starts])
-    lat_deg, lon_deg, alt_m = np.array([start.position for start in starts]).T
-    speeds = [start.plan.speed_mps for start in starts]
-    known = np.isfinite([lat_deg, lon_deg, alt_m, headings, speeds])
-    if known.all() and np.abs(alt_m).max() <= MOST_ALT_M and min(speeds) >= 0.0:
-        with suppress(ValueError):
-            here = lat_deg, wrap_longitude_deg(lon_deg), alt_m
-            return [
-                _part(start, segments)
-                for start, segments in zip(starts, fly_each(here, headings, legs), strict=True)
-            ]
-    return [  # each by itself, which says what is wrong
+    if len(starts) > _FEW:
+        headings = np.array([heading_from_deg(start.heading_deg) for start in starts])
+        lat_deg, lon_deg, alt_m = np.array([start.position for start in starts]).T
+        speeds = [start.plan.speed_mps for start in starts]
+        known = np.isfinite([lat_deg, lon_deg, alt_m, headings, speeds])
+        if known.all() and np.abs(alt_m).max() <= MOST_ALT_M and min(speeds) >= 0.0:
+            with suppress(ValueError):
+                here = lat_deg, wrap_longitude_deg(lon_deg), alt_m
+                segments = fly_each(here, headings, legs)
+                return [_part(*both) for both in zip(starts, segments, strict=True)]
+    return [  # each by itself, which of a few takes less time, and says what is wrong
         _part(start, ScriptedTrajectory(
             start.name,
             lat_deg=start.position[0], lon_deg=start.position[1], alt_m=start.position[2],

@@ -417,4 +417,5 @@ def _filled(times: FloatArray, values: FloatArray) -> FloatArray | None:
 
 
 def _limits(quantity: str) -> tuple[float, float, str]:
-    return _LIMITS.get(quantity, (-1e12, 1e12, "lie within ±1e12"))
+    plain = quantity.removesuffix(" instead")
+    return _LIMITS.get(plain, (-1e12, 1e12, "lie within ±1e12"))

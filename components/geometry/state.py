@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 #: Where an aircraft is (WGS 84) and how it is turned, in the order of `TrajectoryState`.
 POSITION_FIELDS = ("lat_deg", "lon_deg", "alt_m")
@@ -44,6 +44,10 @@ class TrajectoryState:
     def reshape(self, shape: tuple[int, ...]) -> TrajectoryState:
         """Return the same state with its arrays in another shape."""
         return TrajectoryState(*(array.reshape(shape) for array in self.arrays()))
+
+    def taken(self, which: IntArray) -> TrajectoryState:
+        """Return some of the states, of arrays with one axis."""
+        return TrajectoryState(*(array.take(which) for array in self.arrays()))
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """Return the seven arrays in the order of the fields."""

@@ -115,9 +115,12 @@ class VoltagePotential(Component):
                 replica=run,
                 active=np.zeros((heard.shape[1], len(rows)), dtype=bool),
                 track=yaw,
-                goal=self._goal(place[:, rows], yaw),
+                goal=place[:, rows].copy(),
                 last_mps=np.full((2, len(rows)), math.nan),
             )
+            unknown = np.flatnonzero(~np.isin(run, self._known.replica))
+            if len(unknown) and self.p.goal_m is not None:
+                new.goal[:, unknown] = self._goal(new.goal[:, unknown], yaw[unknown])
             known = self._known.latest_or_new(new) if len(self._known) else new
             seen = Others(*(part[:, rows] for part in others))
             own = own_mps[:, rows]

@@ -153,6 +153,9 @@ class SensorOffer:
         None where it differs, or is not measured.
     folds_range_rate : bool
         Whether range rates beyond what is unambiguous are reported as ones within.
+    ambiguous_m : float
+        Ranges are reported modulo this; infinite where none is ambiguous, or several PRFs resolve
+        them.
     reach : Reach or None
         Where it looks, in the ownship's body axes; None where it does not say.
     lasting : mapping of LastingError, or None
@@ -192,6 +195,7 @@ class SensorOffer:
     range_rate_variance_m2_s2: float | None = None
     reach: Reach | None = None
     folds_range_rate: bool = False
+    ambiguous_m: float = math.inf
     lasting: Mapping[str, LastingError] | None = None
     clock: Callable[[], ClockSpec] | None = field(default=None, compare=False)
     latest_s: Fraction | None = None

@@ -51,6 +51,9 @@ class AllFlights(Protocol):
     ) -> TrajectoryState:
         """Return states of who looks in runs (n,), likewise, each at a time (n,) of its own."""
 
+    def once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
+        """Return what was made under a name of equal arrays, or make it; the last one is kept."""
+
 
 class KnownFlights:
     """The flights known at each row of a message, all of one traffic.
@@ -97,6 +100,15 @@ class KnownFlights:
     def ownship_states(self, row: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return the states of who looks as some rows (n,) know it, at a time (n,) of each."""
         return self.flights.own_states(self.run[row], self.known[row], time_s, self._viewer)
+
+    @property
+    def viewer(self) -> int:
+        """The target from which they are seen, -1 for the ownship."""
+        return self._viewer
+
+    def once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
+        """Return what is the same for whoever looks, made once; see `AllFlights.once`."""
+        return self.flights.once(name, of, make)
 
     def _states(
         self, run: IntArray, known: IntArray, columns: IntArray, time_s: FloatArray, ahead_s: Any

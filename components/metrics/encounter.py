@@ -322,6 +322,7 @@ class AlertTimes(FlownMetric):
                 Result(
                     f"first_alert_time_s.{name}", NUMBER, "first alert of the level, s", least=0.0
                 ),
+                Result(f"first_alert_range_m.{name}", NUMBER, "slant range then, m", least=0.0),
                 Result(f"alert_to_loss_s.{name}", NUMBER, "from it to loss of well clear, s"),
                 Result(f"alert_to_nmac_s.{name}", NUMBER, "to a near mid-air collision, s"),
                 Result(f"alert_missed.{name}", EVENT, "well clear lost without an alert before"),
@@ -358,7 +359,11 @@ class AlertTimes(FlownMetric):
             before = alerted & lost & (np.nan_to_num(first_s) <= np.nan_to_num(lost_s))
             lead_s = np.where(before, lost_s - first_s, np.nan)
             missed = lost & ~before
+            range_m = self.ranges_m(group, first_s, to_the_end=self._as_flown)
             values[f"first_alert_time_s.{name}"] = _least_over_time(first_s)
+            values[f"first_alert_range_m.{name}"] = values_of_target(
+                range_m, earliest(first_s, range_m)
+            )
             values[f"alert_to_loss_s.{name}"] = _least_over_time(lead_s, lost)
             values[f"alert_to_nmac_s.{name}"] = _least_over_time(nmac_s - first_s, met)
             sudden = alerted & (first_s - below_s < self.p.surprise_s) & (self.p.level > 1)

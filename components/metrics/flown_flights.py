@@ -9,16 +9,18 @@ import numpy as np
 
 from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.messages.steering import Manoeuvre
-from components.metrics.losses import first_within_s
+from components.metrics.losses import FlightsTogether, first_within_s
 from components.metrics.rows import TargetMetric
 from components.metrics.separation import (
+    ANY_TWO,
     RelativeFlight,
     separations,
     traffic_block,
     traffic_of,
 )
 from components.metrics.true_states import Coverage
-from dsa_des.arrays.types import FloatArray, IntArray
+from dsa_des.arrays.keyed_table import turns
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.platforms import platforms_of
 from dsa_des.scene.scene import Scene
@@ -32,30 +34,40 @@ _SCORES: dict[str, FloatArray] = {
     "separation": 2.0 ** (np.arange(72, -1, -1) / 8.0),
 }
 
-#: Manoeuvres and when they came, s, in order.
-Steering = Sequence[tuple[float, Manoeuvre]]
-#: Those of a run, by the index of the target that is steered; -1 for the ownship.
-SteeringOfRun = Mapping[int, Steering]
+
+class Told(NamedTuple):
+    """Manoeuvres (n,), in order of coming: when each was told and came, s, who is steered (-1 for
+    the ownship), and what it is, (n, fields of `Manoeuvre`).
+    """
+
+    told_s: FloatArray
+    came_s: FloatArray
+    steered: IntArray
+    manoeuvre: FloatArray
+
+    def take(self, which: slice | IntArray | BoolArray) -> "Told":
+        """Return some of them."""
+        return Told(
+            self.told_s[which], self.came_s[which], self.steered[which], self.manoeuvre[which]
+        )
+
+    def of(self, platform: int) -> "Told":
+        """Return those that steer one aircraft."""
+        return self.take(self.steered == platform)
 
 
-class _Told(NamedTuple):
-    """A manoeuvre: when it was told and came, s, and who is steered (-1 for the ownship)."""
-
-    told_s: float
-    came_s: float
-    steered: int
-    manoeuvre: Manoeuvre
+_NOTHING = Told(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, len(_COLUMNS))))
 
 
-def flown_as_steered(own: Sequence[Any], steering: Sequence[Steering]) -> list[SteeredFlight]:
+def flown_as_steered(own: Sequence[Any], told: Sequence[Told]) -> list[SteeredFlight]:
     """Return what aircraft fly, each steered by at least one manoeuvre."""
     flights = SteeredFleet(fleet_of(own))
-    for turn in range(max(map(len, steering), default=0)):
-        now = [number for number, one in enumerate(steering) if len(one) > turn]
-        times_s = np.array([steering[number][turn][0] for number in now])
-        flights = flights.add_manoeuvres(
-            np.array(now), times_s, [steering[number][turn][1] for number in now]
-        )
+    if not told:
+        return []
+    number = np.repeat(np.arange(len(told)), [len(one.came_s) for one in told])
+    time_s, given = (np.concatenate(parts) for parts in list(zip(*told, strict=True))[1::2])
+    for one in turns(number):  # the first of each aircraft, then the next
+        flights = flights.add_manoeuvres(number[one], time_s[one], given[one])
     return list(flights)
 
 
@@ -67,6 +79,8 @@ class FlownMetric(TargetMetric):
     """
 
     scores = _SCORES
+    #: Whether ``platform = "*"`` asks for the distances between any two.
+    of_any_two = False
 
     def __init__(self, parameters: Any, scene: Scene, *, steered: bool = True) -> None:
         super().__init__(parameters, scene)
@@ -77,11 +91,15 @@ class FlownMetric(TargetMetric):
         named = getattr(parameters, "platform", None)
         if named or any(block.options.platform for block in scene.blocks.values()):
             names = traffic_of(scene)[0].platforms()
-            if named is not None and named not in names:
+            any_two = named == "*" and self.of_any_two
+            if named is not None and named not in names and not any_two:
                 raise ValueError(f"platform: there is no {named!r}{did_you_mean(named, names)}")
             carrying = platforms_of(scene, {traffic: names})
             self._on = {block: names.index(on) - 1 for block, on in carrying.items()}
-            self.viewer = -1 if named is None else names.index(named) - 1
+            if any_two:
+                self.viewer = ANY_TWO
+            elif named is not None:
+                self.viewer = names.index(named) - 1
         #: Block that steers → delay of its manoeuvres; of none where flights are those planned.
         self.delays_s: dict[str, float] = {}
         for wire in scene.wires if steered else ():
@@ -102,13 +120,14 @@ class FlownMetric(TargetMetric):
         """
         source = traffic_of(group.scenes[number])[0]
         own, *others = source.seen_from(source.platforms()[self.viewer + 1])
-        told = _by_platform(self._received_manoeuvres(group).get(number, ()))
+        told = self._received_manoeuvres(group).get(number, _NOTHING)
         places = [place for place in range(len(source.targets)) if place not in source.unseen]
         places = sorted({*places, self.viewer} - {-1})
         flights = [own, *others]
         of_each = [self.viewer, *(-1 if place == self.viewer else place for place in places)]
         for at, place in enumerate(of_each):
-            if there := _limit_to_presence(place, flights[at], told.get(place, ())):
+            there = _limit_to_presence(place, flights[at], told.of(place))
+            if len(there.came_s):
                 name = flights[at].name
                 (flights[at],) = flown_as_steered([flights[at]], [there])
                 flights[at].name = name
@@ -118,44 +137,38 @@ class FlownMetric(TargetMetric):
         """Return those of some blocks that are on the platform that looks."""
         return [block for block in blocks if self._on.get(block, -1) == self.viewer]
 
-    def manoeuvres(self, group: Group) -> Mapping[int, Steering]:
-        """Return the viewing platform's manoeuvres, by replica, for replicas with any."""
-        own = {
-            k: _by_platform(told).get(self.viewer, ())
-            for k, told in self._received_manoeuvres(group).items()
-        }
-        return {k: steering for k, steering in own.items() if steering}
+    def manoeuvres(self, group: Group) -> Mapping[int, Told]:
+        """Return the manoeuvres of who looks, of every replica of a group that has any."""
+        own = {k: told.of(self.viewer) for k, told in self._received_manoeuvres(group).items()}
+        return {k: told for k, told in own.items() if len(told.came_s)}
 
     def steered_runs(self, group: Group) -> IntArray:
         """Return the replicas in which any aircraft is steered."""
         return np.array(sorted(self._received_manoeuvres(group)), dtype=np.int64)
 
-    def _received_manoeuvres(self, group: Group) -> Mapping[int, list[_Told]]:
-        """Return when each manoeuvre of every replica that has any was told, came, and what it was.
+    def _received_manoeuvres(self, group: Group) -> Mapping[int, Told]:
+        """Return the manoeuvres of every replica that has any; see `Told`.
 
-        In order of coming; what is told is known when all before it is.
+        What is told is known when all before it is.
         """
-        result: dict[int, list[_Told]] = {}
         if not self.delays_s:
-            return result
+            return {}
         table: Any = group.tables["manoeuvres"]
-        names = table["block"].names
-        rows = zip(
-            table["replica"].tolist(), table["block"].codes.tolist(), table["time_s"].tolist(),
-            *(_commanded_values(table, name) for name in _COLUMNS), strict=True,
-        )  # fmt: skip
-        for replica, block, time_s, *values in rows:
-            if names[block] not in self.delays_s:
-                continue
-            came_s = time_s + self.delays_s[names[block]]
-            if came_s < group.duration_s[replica]:
-                steered = self._on.get(names[block], -1)
-                told = _Told(time_s, came_s, steered, Manoeuvre(*values))
-                result.setdefault(replica, []).append(told)
-        for replica, mine in result.items():
-            mine.sort(key=lambda one: one.came_s)
-            told_s = np.maximum.accumulate([one.told_s for one in mine]).tolist()
-            result[replica] = [one._replace(told_s=t) for t, one in zip(told_s, mine, strict=True)]
+        names, codes = table["block"].names, table["block"].codes
+        delay_s = np.array([self.delays_s.get(name, np.inf) for name in names] or [np.inf])
+        steered = np.array([self._on.get(name, -1) for name in names] or [-1])
+        nothing = np.full(len(codes), np.nan)
+        told_s, replica = np.asarray(table["time_s"], dtype=np.float64), table["replica"]
+        given = np.array([table.get(name, nothing) for name in _COLUMNS], dtype=np.float64).T
+        came_s = told_s + delay_s[codes]
+        every = Told(told_s, came_s, steered[codes], given)
+        rows = np.flatnonzero(came_s < np.asarray(group.duration_s)[replica])
+        rows = rows[np.lexsort((came_s[rows], replica[rows]))]
+        result = {}
+        numbers, first = np.unique(replica[rows], return_index=True)
+        for number, mine in zip(numbers.tolist(), np.split(rows, first)[1:], strict=True):
+            told = every.take(mine)
+            result[number] = told._replace(told_s=np.maximum.accumulate(told.told_s))
         return result
 
     def of_flights(
@@ -195,16 +208,16 @@ class FlownMetric(TargetMetric):
             return self.of_flights(group, partial(first_within_s, limits_m), to_the_end=True)
         told = self._received_manoeuvres(group)
         result = np.full((len(levels), len(group)), np.inf)
-        for count in range(1 + max(map(len, told.values()), default=0)):
+        counts = np.zeros(len(group), dtype=np.int64)
+        counts[list(told)] = [len(mine.came_s) for mine in told.values()]
+        for count in range(1 + int(counts.max(initial=0))):
             # As if no more than so many manoeuvres were told: known from when the last of them is.
-            some = np.array([k for k in range(len(group)) if len(told.get(k, ())) >= count])
-            steering = {k: _by_platform(mine[:count]) for k, mine in told.items()}
+            some = np.flatnonzero(counts >= count)
+            steering = {k: mine.take(slice(count)) for k, mine in told.items()}
             runs, run_of = flights_of(group, self.p.step_s, None, steering, viewer=self.viewer)
             used, mine = np.unique(run_of[some], return_inverse=True)
             event_s = first_within_s([(radius_m, half_m)], [runs[k] for k in used])[0, mine]
-            known = [
-                (0.0, *(one.told_s for one in told.get(k, ())), math.inf) for k in some.tolist()
-            ]
+            known = [(0.0, *told.get(k, _NOTHING).told_s.tolist(), math.inf) for k in some.tolist()]
             from_s, until_s = np.array([times[count : count + 2] for times in known]).T
             for number, level in enumerate(levels):
                 at_s = np.fmax(from_s, event_s - level)
@@ -222,7 +235,7 @@ class FlownMetric(TargetMetric):
         """
         runs, run_of = self._flights(group, True, to_the_end)
         alone = [[flight] for run in runs for flight in run]
-        names = sorted({flight.name for (flight,) in alone})
+        names = _names(runs)
         index = {name: number for number, name in enumerate(names)}
         values = read(alone or [[]])
         result = np.full((len(values), len(runs), len(names)), np.nan)
@@ -230,11 +243,29 @@ class FlownMetric(TargetMetric):
         result[:, run, [index[flight.name] for (flight,) in alone]] = values[:, : len(alone)]
         return names, result[:, run_of]
 
+    def ranges_m(self, group: Group, time_s: FloatArray, *, to_the_end: bool) -> FloatArray:
+        """Return the slant range of each target, at a time (replicas, targets) of its own, m.
+
+        Targets are those of `of_each_flight`; NaN where there is no time, or one is not there.
+        """
+        runs, run_of = self._flights(group, True, to_the_end)
+        names = _names(runs)
+        known = [(k, flight) for k, run in enumerate(runs) for flight in run]
+        number_of = {(k, flight.name): n for n, (k, flight) in enumerate(known)}
+        result = np.full(time_s.shape, np.nan)
+        replica, target = np.nonzero(np.isfinite(time_s))
+        of = zip(run_of[replica].tolist(), target.tolist(), strict=True)
+        flight = np.array([number_of[k, names[t]] for k, t in of], dtype=np.int64)
+        if len(flight):
+            together = FlightsTogether([flight for _, flight in known])
+            range_m = together.apart_m(flight, time_s[replica, target])[0]
+            result[replica, target] = np.where(np.isfinite(range_m), range_m, np.nan)
+        return result
+
     def _flights(
         self, group: Group, steered: bool, to_the_end: bool, some: IntArray | None = None
     ) -> tuple[list[list[RelativeFlight]], IntArray]:
-        told = self._received_manoeuvres(group) if steered else {}
-        steering = {k: _by_platform(mine) for k, mine in told.items()}
+        steering = self._received_manoeuvres(group) if steered else {}
         target, step_s = getattr(self.p, "target", None), self.p.step_s
         return flights_of(
             group, step_s, target, steering, to_the_end=to_the_end, some=some, viewer=self.viewer
@@ -254,7 +285,7 @@ def flights_of(
     group: Group,
     step_s: float | None,
     target: str | None,
-    steering: Mapping[int, SteeringOfRun] | None = None,
+    steering: Mapping[int, Told] | None = None,
     *,
     to_the_end: bool = False,
     some: IntArray | None = None,
@@ -298,7 +329,7 @@ def flights_of(
         (number, place, flight, there)
         for number in steered
         for place, flight in _aircraft_of(runs[run_of[number]]).items()
-        if (there := _limit_to_presence(place, flight, steering[number].get(place, ())))
+        if len((there := _limit_to_presence(place, flight, steering[number].of(place))).came_s)
     ]
     flown = flown_as_steered([one[2] for one in told], [one[3] for one in told])
     by_run: dict[int, dict[int, SteeredFlight]] = {}
@@ -311,19 +342,9 @@ def flights_of(
     return runs, run_of if some is None else run_of[some]
 
 
-def _commanded_values(table: Any, name: str) -> list[float]:
-    """Return what manoeuvres say; NaN of what no block commands, such as velocities."""
-    nothing = np.full(len(table["replica"]), np.nan)
-    values: list[float] = table.get(name, nothing).tolist()
-    return values
-
-
-def _by_platform(told: Sequence[_Told]) -> dict[int, list[tuple[float, Manoeuvre]]]:
-    """Return the manoeuvres commanded to each aircraft, by its index."""
-    result: dict[int, list[tuple[float, Manoeuvre]]] = {}
-    for one in told:
-        result.setdefault(one.steered, []).append((one.came_s, one.manoeuvre))
-    return result
+def _names(runs: Sequence[list[RelativeFlight]]) -> list[str]:
+    """Return the names of all targets, in their order."""
+    return sorted({flight.name for run in runs for flight in run})
 
 
 def _aircraft_of(run: Sequence[RelativeFlight]) -> dict[int, Any]:
@@ -335,12 +356,12 @@ def _aircraft_of(run: Sequence[RelativeFlight]) -> dict[int, Any]:
     }
 
 
-def _limit_to_presence(place: int, flight: Any, steering: Steering) -> Steering:
-    """Return the manoeuvres commanded to an aircraft while it is present; the ownship always is."""
+def _limit_to_presence(place: int, flight: Any, told: Told) -> Told:
+    """Return what an aircraft is told while it is there; the ownship always is."""
     if place < 0:
-        return steering
+        return told
     first_s, last_s = flight.interval_present()
-    return [one for one in steering if first_s <= one[0] <= last_s]
+    return told.take((first_s <= told.came_s) & (told.came_s <= last_s))
 
 
 class PlatformTracks(Metric):

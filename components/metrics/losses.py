@@ -123,10 +123,14 @@ class FlightsTogether:
 
     def level_distances_m(self, flight: IntArray, time_s: FloatArray) -> tuple[FloatArray, ...]:
         """Return horizontal distance and difference of altitudes; infinite where one is absent."""
+        return self.apart_m(flight, time_s)[1:]
+
+    def apart_m(self, flight: IntArray, time_s: FloatArray) -> tuple[FloatArray, ...]:
+        """Return `separation.distances_m` of flights (n,), each at a time (n,) of its own."""
         blocks = []
         for first in range(0, len(flight), CELLS_AT_ONCE):
             some = flight[first : first + CELLS_AT_ONCE], time_s[first : first + CELLS_AT_ONCE]
-            blocks.append(distances_m(self.own_at(*some), self.target_at(*some))[1:])
+            blocks.append(distances_m(self.own_at(*some), self.target_at(*some)))
         return tuple(np.concatenate(parts) for parts in zip(*blocks, strict=True))
 
 
@@ -331,6 +335,18 @@ def nominal_geometry(
         for row, near, miss_m in ((0, up_m < half_m, level_m), (1, level_m < radius_m, up_m)):
             found = np.where(near, miss_m, np.inf).min(axis=1)
             np.minimum.at(result[7 + row * len(sizes_m) + k], of, found)
+    return result
+
+
+def nearest_in_runs(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+    """Return the smallest range (m) of any flight of each run, and its time (s), (2, runs).
+
+    NaN where no two are ever there together.
+    """
+    range_m, time_s = nearest_of([flight for run in runs for flight in run])
+    nearest = _nearest_of_each(runs, range_m, time_s)
+    result = np.full((2, len(runs)), np.nan)
+    result[:, nearest.runs] = range_m[nearest.flights], nearest.time_s
     return result
 
 

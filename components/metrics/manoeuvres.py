@@ -32,6 +32,6 @@ class ManoeuvreTimes(FlownMetric):
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return both for every replica; no time where there is no manoeuvre."""
         first, count = np.full(len(group), np.nan), np.zeros(len(group))
-        for replica, steering in self.manoeuvres(group).items():
-            first[replica], count[replica] = steering[0][0], len(steering)
+        for replica, told in self.manoeuvres(group).items():
+            first[replica], count[replica] = told.came_s[0], len(told.came_s)
         return {"first_manoeuvre_time_s": first, "manoeuvres": count}

@@ -1,4 +1,5 @@
-"""Risk of an encounter: losses with and without avoidance, their severity, and the risk ratio.
+"""Risk of an encounter: losses with and without avoidance, their severity, and the risk ratio;
+and how near any two aircraft come.
 
 Every encounter is run without avoidance (*nominal*) and with it (*mitigated*), on the same random
 numbers, and has a weight that says how often it happens in the airspace. The risk ratio is what
@@ -6,7 +7,7 @@ numbers, and has a weight that says how often it happens in the airspace. The ri
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from pydantic import Field
 from components.arguments.units import FOOT_M
 from components.metrics.encounter import STEP, SizeParameters, size
 from components.metrics.flown_flights import FlownMetric, each_alone
+from components.metrics.losses import nearest_in_runs
 from components.metrics.rows import TargetParameters
 from components.metrics.separation import RelativeFlight, relative_states, traffic_block
 from components.well_clear.severity import collision_probability, loss_severity
@@ -24,8 +26,8 @@ from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, FRACTION, NUMBER, Group, Result
 
 __all__ = [
-    "METHODS", "Mitigated", "RiskParameters", "RiskRatio", "Severity", "risk_ratio",
-    "risk_ratios_by_class",
+    "METHODS", "LeastSeparation", "Mitigated", "RiskParameters", "RiskRatio", "Severity",
+    "risk_ratio", "risk_ratios_by_class",
 ]  # fmt: skip
 
 RiskRatio = PairedRatio
@@ -43,10 +45,21 @@ class RiskParameters(SizeParameters):
     step_s: float | None = STEP
 
 
+class MitigatedParameters(RiskParameters):
+    """What counts as an event, and between whom."""
+
+    platform: str | None = Field(
+        default=None,
+        description="Name of the aircraft from which the others are seen, by default the ownship; "
+        "'*' for events between any two.",
+    )
+
+
 class Mitigated(FlownMetric):
     """Events with and without the manoeuvres that the ownship was told to fly."""
 
-    Parameters = RiskParameters
+    Parameters: ClassVar[Any] = MitigatedParameters
+    of_any_two = True
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
@@ -95,6 +108,59 @@ class Mitigated(FlownMetric):
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
         """Return what happens without manoeuvres."""
         return self.nominal(group)
+
+
+class LeastSeparationParameters(RiskParameters):
+    """Whose pairs count, what is a loss, and how it is found."""
+
+    platform: str = Field(
+        default="*", description="Name of the aircraft whose pairs count; by default any two."
+    )
+    steered: bool = Field(
+        default=True, description="Take flights with everybody's manoeuvres, not as planned."
+    )
+
+
+class LeastSeparation(FlownMetric):
+    """How near any two aircraft of a scene come, and whether any two lose separation.
+
+    All pairs count, whoever of them carries a chain; places on the ground are no aircraft.
+    """
+
+    Parameters = LeastSeparationParameters
+    of_any_two = True
+
+    def __init__(self, parameters: Any, scene: Scene) -> None:
+        super().__init__(parameters, scene, steered=parameters.steered)
+
+    def results(self) -> list[Result]:
+        """Return the distance, its time, and both events."""
+        results = [
+            Result("least_separation_m", NUMBER, "smallest slant range of any two, m", least=0.0),
+            Result("least_separation_time_s", NUMBER, "when that is, s", least=0.0),
+        ]
+        return results + [
+            Result(f"any_{name}", EVENT, f"any two within {radius:g} m and {half:g} m")
+            for name, (radius, half) in zip(_EVENTS, self.p.sizes_m, strict=True)
+        ]
+
+    def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
+        """Return the sizes of both events, of well clear where no time counts."""
+        cylinders: dict[str, tuple[float, float]] = self.p.cylinders_m()
+        return {f"any_{name}": sizes for name, sizes in cylinders.items()}
+
+    def measure(self, group: Group) -> Mapping[str, AnyArray]:
+        """Return all of it for every replica."""
+        range_m, time_s = self.of_flights(group, nearest_in_runs, to_the_end=True)
+        losses = self.of_flights(group, self.p.losses_s, to_the_end=True)[:2]
+        return {
+            "least_separation_m": range_m,
+            "least_separation_time_s": time_s,
+            **{
+                f"any_{name}": (~np.isnan(of)).astype(float)
+                for name, of in zip(_EVENTS, losses, strict=True)
+            },
+        }
 
 
 class SeverityParameters(TargetParameters, SizeParameters):

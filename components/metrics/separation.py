@@ -3,6 +3,7 @@
 Nothing here depends on what sensors see; it is read off the traffic block of a scene.
 """
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from copy import copy
@@ -29,6 +30,8 @@ from dsa_des.time.randomness import Streams
 
 #: Times looked at together: it bounds the memory, however long the run.
 MOST_AT_ONCE = 65_536
+#: In place of who looks: distances are those between any two.
+ANY_TWO = -2
 # Times of a flight that are kept for metrics that ask for them again.
 _KEPT = 4096
 # The speeds of turns and long legs hold to 2e-4, and the ownship's level plane turns with it.
@@ -77,7 +80,8 @@ def separations(
 ) -> "list[RelativeFlight]":
     """Return the distances of every target of a scene, up to an early end of the run at `until_s`.
 
-    Seen from a target, by its index, it and the ownship (-1) change places.
+    Seen from a target, by its index, it and the ownship (-1) change places; with `ANY_TWO` those of
+    any two aircraft.
 
     They are taken on a grid of `step_s` and at the times of the source's own samples. None looks
     between them for losses, with a grid of `STEP_S` for all else.
@@ -85,11 +89,12 @@ def separations(
     source, duration_s = traffic_of(scene)
     end_s = min(duration_s, until_s)
     count = regular_count(step_s or STEP_S, end_s)
-    return [
-        RelativeFlight(source, number, step_s, count, end_s, viewer)
-        for number in range(len(source.targets))
-        if number == viewer or number not in source.unseen
-    ]
+    seen = [number for number in range(len(source.targets)) if number not in source.unseen]
+    if viewer == ANY_TWO:
+        pairs = list(itertools.combinations([-1, *seen], 2))
+    else:
+        pairs = [(viewer, number) for number in sorted({*seen, viewer} - {-1})]
+    return [RelativeFlight(source, number, step_s, count, end_s, looks) for looks, number in pairs]
 
 
 class RelativeFlight:

@@ -21,6 +21,7 @@ from components.arguments.checks import (
 )
 from components.radar.resolution import cell_size
 from components.sensor.look import Cells
+from components.terrain.reflection import reflection_coefficient
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
@@ -117,6 +118,35 @@ def ground_ring_rcs_m2(
     return unflatten(np.where(distance >= height, rcs, 0.0), shape)
 
 
+def altitude_line_rcs_m2(
+    range_m: ArrayLike,
+    height_m: ArrayLike,
+    *,
+    range_resolution_m: float,
+    slope_rad: float,
+    reflectivity: float,
+) -> Any:
+    """Return the RCS of the ground below that mirrors, in a range cell around a slant range, m².
+
+    Facets that lie level mirror what comes from straight above: σ0 = ρ² / tan² β0 · exp(-tan² θ /
+    tan² β0) at an angle θ from the vertical, of facets whose slopes have tan β0 (the
+    quasi-specular form of D. K. Barton, "Land clutter models for radar design and analysis", Proc.
+    IEEE 73(2), 1985), ρ² being the `reflectivity` of power straight down. Over a cell's ring of
+    flat ground that is pi h² ρ² (exp(-a) - exp(-b)), with a and b = (R² - h²) / (h tan β0)² at its
+    edges; over all of it pi h² ρ², the RCS of a mirror below whatever its roughness.
+    """
+    shape, (distance, height) = broadcast_flat(
+        range_m=check_not_negative("range_m", range_m), height_m=positive("height_m", height_m)
+    )
+    half_m = 0.5 * float(positive("range_resolution_m", range_resolution_m))
+    slope_m = height * math.tan(slope_rad)
+    edges = (np.maximum(distance + side * half_m, height) for side in (-1.0, 1.0))
+    near, far = ((edge - height) * (edge + height) / slope_m**2 for edge in edges)
+    with np.errstate(under="ignore"):
+        share = np.exp(-near) - np.exp(-far)
+    return unflatten(math.pi * height**2 * reflectivity * share, shape)
+
+
 def _distance_or_height(distance: Any, height: Any) -> Any:
     """Return the distance, or the height where the distance is 0 (no division by 0)."""
     return np.where(distance > 0.0, distance, height)
@@ -182,6 +212,24 @@ class Echo:
         on the beam's axis.
         """
         raise NotImplementedError
+
+
+def altitude_line_of(block: Any, range_m: FloatArray, height_m: FloatArray) -> FloatArray:
+    """Return the RCS of the altitude line of a scene's ground; 0 where it has no facets."""
+    terrain = terrain_of(block)
+    if terrain.facet_slope_deg is None:
+        return np.zeros(len(range_m))
+    down = reflection_coefficient(
+        0.5 * math.pi, terrain.permittivity(block.wavelength_m), "horizontal"
+    )
+    rcs = altitude_line_rcs_m2(
+        range_m,
+        height_m,
+        range_resolution_m=cell_size(block.p)[2],
+        slope_rad=math.radians(terrain.facet_slope_deg),
+        reflectivity=abs(down) ** 2,
+    )
+    return np.asarray(rcs)
 
 
 class GroundEcho(Echo):

@@ -1,5 +1,6 @@
 """The base class of radar blocks, and the crudest of them (``radar.range_boundary``, §2.2.2)."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
@@ -123,8 +124,12 @@ class Radar(SweepingSensor):
         return replace(reach, lasts_s=LASTS_S + reach.lasts_s)
 
     def offer(self, port: str) -> Any:
-        """Say beside what every sensor says whether range rates fold."""
-        return replace(super().offer(port), folds_range_rate=self.p.range_rate_folds)
+        """Say beside what every sensor says whether range rates and ranges fold."""
+        return replace(
+            super().offer(port),
+            folds_range_rate=self.p.range_rate_folds,
+            ambiguous_m=getattr(self.p, "farthest_report_m", math.inf),
+        )
 
     def exact_because(self) -> str:
         """A rate divides the change of an error over hundredths of a second by these."""

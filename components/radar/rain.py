@@ -1,158 +1,44 @@
-"""Rain clutter, and clutter of rain and ground all around that sidelobes receive."""
+"""Echoes of rain beside a target's; of rain and ground in the sidelobes, and of other pulses.
+
+An echo from R arrives when those of R ± k c / 2PRF do, of pulses sent earlier or later. A radar of
+medium PRF over ground so hears, beside a target that is far, the ground that is near.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import (
-    broadcast_flat,
-    check_not_negative,
-    check_numbers,
-    finite,
-    positive,
-    refuse,
-    unflatten,
+from components.atmosphere.rain_echo import (
+    fall_speed_m_s,
+    rain_reflectivity_per_m,
+    rain_shell_m3,
+    rain_spread_m_s,
+    rain_volume_m3,
 )
+from components.geometry import SEMI_MAJOR_AXIS_M
 from components.radar.ground_clutter import (
     CLUTTER,
     Echo,
     NoEcho,
     Velocity,
+    altitude_line_of,
+    ground_clutter_rcs_m2,
     ground_ring_rcs_m2,
     height_above_terrain_m,
     platform_spread_m_s,
     terrain_of,
 )
+from components.radar.pulse_trains.ambiguity import unambiguous_range_m
 from components.radar.resolution import CELL_SIZES, cell_size
 from components.sensor.look import Cells
 from components.sensor.weather_cells import cells_verdict, on_the_way, weather_cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
-
-#: Drops are small against the wavelength, and scatter after Rayleigh, up to here.
-HIGHEST_RAYLEIGH_HZ = 35.5e9
-#: |K|² of water at centimetre waves.
-DIELECTRIC_FACTOR = 0.93
-
-_LN_2 = math.log(2.0)
-# Wind shear (4 m/s per km, at most 6 m/s), turbulence and the spread of drops' fall speeds.
-_SHEAR_PER_S, _MOST_SHEAR_M_S, _TURBULENCE_M_S, _FALL_SPREAD_M_S = 4e-3, 6.0, 1.0, 1.0
-
-
-def rain_reflectivity_per_m(rain_rate_mm_h: ArrayLike, wavelength_m: float) -> Any:
-    """Return the radar cross-section of a volume of rain, η in m² per m³.
-
-    η = pi⁵ |K|² Z / λ⁴ with Z = 200 R^1.6 mm⁶/m³ (J. S. Marshall and W. M. Palmer, J. Meteorology
-    5, 1948; M. I. Skolnik, Introduction to Radar Systems, 3rd ed., section 7.6; F. E. Nathanson,
-    Radar Design Principles, 2nd ed., chapter 6). Drops scatter after Rayleigh: up to
-    `HIGHEST_RAYLEIGH_HZ`, and there within 4 dB of spheres after Mie up to 25 mm/h; above, η is too
-    large (12 dB at 94 GHz and 4 mm/h).
-    """
-    rate = check_not_negative("rain_rate_mm_h", rain_rate_mm_h)
-    wave = float(positive("wavelength_m", wavelength_m))
-    z_m3 = 200e-18 * rate**1.6
-    return (math.pi**5 * DIELECTRIC_FACTOR / wave**4 * z_m3)[()]
-
-
-def rain_volume_m3(
-    range_m: ArrayLike,
-    elevation_rad: ArrayLike,
-    alt_m: ArrayLike,
-    *,
-    azimuth_beamwidth_rad: float,
-    elevation_beamwidth_rad: float,
-    range_resolution_m: float,
-    lowest_m: float,
-    highest_m: float,
-) -> Any:
-    """Return the volume of rain in the range cell of a target at which the beam points, m³.
-
-    Weighted by the two-way gain of a beam of one-way half-power widths, as rain counts beside a
-    target amid the beam. It rains from `lowest_m` (-inf for rain that nothing ends below) to
-    `highest_m`.
-
-    pi R² θ_az θ_el ΔR / (8 ln 2) of a Gaussian beam (J. R. Probert-Jones, Quart. J. Royal Met. Soc.
-    88, 1962), times the share of its two-way gain that lies where it rains: over the height it is
-    Gaussian with R cos(elevation) θ_el / sqrt(16 ln 2).
-    """
-    for name, value in (
-        ("azimuth_beamwidth_rad", azimuth_beamwidth_rad),
-        ("elevation_beamwidth_rad", elevation_beamwidth_rad),
-        ("range_resolution_m", range_resolution_m),
-    ):
-        positive(name, value)
-    shape, (distance, elevation, height) = broadcast_flat(
-        range_m=check_not_negative("range_m", range_m),
-        elevation_rad=finite("elevation_rad", elevation_rad),
-        alt_m=finite("alt_m", alt_m),
-    )
-    solid = math.pi * azimuth_beamwidth_rad * elevation_beamwidth_rad / (8.0 * _LN_2)
-    spread = distance * np.cos(elevation) * elevation_beamwidth_rad / math.sqrt(16.0 * _LN_2)
-    spread = np.maximum(spread, 1e-9)
-    share = _normal_share_below((highest_m - height) / spread) - _normal_share_below(
-        (lowest_m - height) / spread
-    )
-    volume = distance * distance * solid * range_resolution_m * np.maximum(share, 0.0)
-    return unflatten(volume, shape)
-
-
-def rain_shell_m3(
-    range_m: ArrayLike,
-    own_alt_m: ArrayLike,
-    *,
-    range_resolution_m: float,
-    lowest_m: float,
-    highest_m: float,
-) -> Any:
-    """Return the volume of rain at a slant range in all directions, which sidelobes meet, m³.
-
-    2 pi R ΔR times the height of the shell in which it rains (Archimedes).
-    """
-    positive("range_resolution_m", range_resolution_m)
-    shape, (distance, own) = broadcast_flat(
-        range_m=check_not_negative("range_m", range_m), own_alt_m=finite("own_alt_m", own_alt_m)
-    )
-    top = np.clip(highest_m - own, -distance, distance)
-    bottom = np.clip(lowest_m - own, -distance, distance)
-    height = np.maximum(top - bottom, 0.0)
-    return unflatten(2.0 * math.pi * distance * range_resolution_m * height, shape)
-
-
-def fall_speed_m_s(rain_rate_mm_h: ArrayLike) -> Any:
-    """Return how fast rain falls as a radar sees it, m/s: 2.6 Z^0.107 (J. Joss, 1970)."""
-    rate = check_numbers("rain_rate_mm_h", rain_rate_mm_h)
-    refuse("rain_rate_mm_h", rate, ~(rate >= 0.0), "be 0 or more")
-    return (2.6 * (200.0 * rate**1.6) ** 0.107)[()]
-
-
-def rain_spread_m_s(
-    range_m: ArrayLike, elevation_rad: ArrayLike, elevation_beamwidth_rad: float
-) -> Any:
-    """Return the standard deviation of the rain's own range rates in a cell, m/s.
-
-    Shear of the wind over the beam's height, 0.42 · 4 m/s/km · R · θ_el and at most 6 m/s,
-    turbulence of 1 m/s and 1 m/s · sin(elevation) of the drops' fall (Nathanson, chapter 6).
-    """
-    shape, (distance, elevation) = broadcast_flat(
-        range_m=check_not_negative("range_m", range_m),
-        elevation_rad=finite("elevation_rad", elevation_rad),
-    )
-    shear = 0.42 * _SHEAR_PER_S * elevation_beamwidth_rad * distance * np.cos(elevation)
-    shear = np.minimum(shear, _MOST_SHEAR_M_S)
-    fall = _FALL_SPREAD_M_S * np.sin(elevation)
-    return unflatten(np.sqrt(shear**2 + _TURBULENCE_M_S**2 + fall**2), shape)
-
-
-def _normal_share_below(deviations: FloatArray) -> FloatArray:
-    """Return the share of a normal distribution that lies so many deviations above it or lower."""
-    from scipy.special import ndtr
-
-    share: FloatArray = ndtr(deviations)
-    return share
 
 
 class RainClutter(Effect[Echo]):
@@ -257,8 +143,8 @@ class SidelobeClutter(Effect[Echo]):
     """Ground and rain at the target's range all around, received through the sidelobes.
 
     All sidelobes have one mean level (``sidelobe_level_db``), towards the ground below as well:
-    the altitude line is in it. Flown over, they have range rates of every direction, so that a
-    moving-target filter takes little of them.
+    the altitude line is in it, mirrored as ``facet_slope_deg`` of the terrain says. Flown over,
+    they have range rates of every direction, so that a moving-target filter takes little of them.
     """
 
     name = "sidelobe clutter"
@@ -303,6 +189,8 @@ class SidelobeEcho(Echo):
                 cells.range_m, height_above_terrain_m(own_alt_m, lowest_m),
                 gamma_db=self.terrain.clutter_gamma_db, range_resolution_m=step_m,
             )  # fmt: skip
+            height_m = height_above_terrain_m(own_alt_m, lowest_m)
+            rcs = rcs + altitude_line_of(self.block, cells.range_m, height_m)
         if self.per_m:
             rcs = rcs + self.per_m * rain_shell_m3(
                 cells.range_m, own_alt_m, range_resolution_m=step_m, lowest_m=lowest_m,
@@ -316,6 +204,131 @@ class SidelobeEcho(Echo):
         """Around 0, with the deviation that a circle of directions gives the ownship's speed."""
         north, east, _ = own_m_s
         return np.zeros(len(cells)), np.sqrt(0.5 * (north * north + east * east))
+
+
+#: Beyond it nothing of the ground or of rain is summed, m: the horizon of 9,000 m without air.
+_FARTHEST_M = math.sqrt(2.0 * SEMI_MAJOR_AXIS_M * 9000.0)
+
+
+def other_ranges_m(range_m: FloatArray, fold_m: float, farthest_m: float) -> Iterator[FloatArray]:
+    """Yield the ranges whose echoes arrive with those of some ranges, without these, to a farthest.
+
+    Nearest first; infinite where there is none.
+    """
+    own = np.floor(range_m / fold_m)
+    first = range_m - own * fold_m
+    for number in range(math.ceil(farthest_m / fold_m) + 1):
+        other = first + number * fold_m
+        there = (own != number) & (other > 0.0) & (other <= farthest_m)
+        if there.any():
+            yield np.where(there, other, np.inf)
+
+
+class FoldedClutter(Effect[Echo]):
+    """Ground and rain from other pulses, in the beam and through the sidelobes.
+
+    Of several PRFs those count that hear least of it, as many as must see a target. The air on the
+    way is taken to weaken it as it does a target's echo. Its range rates are those of the ground
+    from where most of it comes.
+    """
+
+    name = "folded clutter"
+    acts_on = CLUTTER
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask for ``range_folds``, and for ground or rain."""
+        if not block.p.range_folds:
+            return Verdict(False, "range_folds is false")
+        rain = block.context.sections["weather"].rain_rate_mm_h
+        if terrain_of(block) is None and not (rain and not no_rain_echo(block)):
+            return Verdict(False, "there is neither [terrain] height_m nor rain")
+        every = " or ".join(f"{unambiguous_range_m(f) / 1e3:.4g}" for f in block.p.prfs_hz)
+        return Verdict(True, f"range_folds is true: clutter of every {every} km beside a target's")
+
+    def build(self, block: Any) -> Echo:
+        """Return what gives the RCS at a target's range that the other ranges come to."""
+        if not self.verdict(block).simulated:
+            return NoEcho(block)
+        return FoldedEcho(block)
+
+
+class FoldedEcho(Echo):
+    """The sum over all other ranges, as if it were at the target's."""
+
+    def __init__(self, block: Any) -> None:
+        super().__init__(block)
+        self._weather = block.context.sections["weather"]
+        self._nearest_m = block.p.minimum_range_m or 0.0
+        level_db = block.p.sidelobe_level_db
+        self._two_way = 0.0 if level_db is None else 10.0 ** (0.2 * level_db)
+        rate = self._weather.rain_rate_mm_h
+        rains = rate > 0.0 and not no_rain_echo(block)
+        self._per_m = float(rain_reflectivity_of(block, rate)) if rains else 0.0
+
+    def __call__(self, cells: Any) -> FloatArray:
+        """Return it for the PRFs that decide, m²."""
+        each = np.stack([self._of_prf(cells, prf_hz)[0] for prf_hz in self.block.p.prfs_hz])
+        needed: int = self.block.p.prfs_needed or len(each)
+        return np.asarray(np.sort(each, axis=0)[needed - 1])
+
+    def _of_prf(self, cells: Cells, prf_hz: float) -> tuple[FloatArray, FloatArray]:
+        """Return what one PRF hears, m², and at which range most of it is."""
+        total, most, where = np.zeros(len(cells)), np.zeros(len(cells)), np.array(cells.range_m)
+        for other_m in other_ranges_m(cells.range_m, unambiguous_range_m(prf_hz), _FARTHEST_M):
+            heard = np.isfinite(other_m) & (other_m >= self._nearest_m)
+            at_m = np.where(heard, other_m, 1.0)
+            rcs = np.where(heard, self._rcs_m2(cells, at_m), 0.0) * (cells.range_m / at_m) ** 4
+            total += rcs
+            where = np.where(rcs > most, at_m, where)
+            most = np.maximum(most, rcs)
+        return total, where
+
+    def _rcs_m2(self, cells: Cells, at_m: FloatArray) -> FloatArray:
+        """Return the RCS of ground and rain at other ranges of each cell's beam."""
+        azimuth, elevation = self.beam_rad
+        own_m, lowest_m = cells.of_row("own_alt_m"), -math.inf
+        rcs = np.zeros(len(cells))
+        if self.terrain is not None:
+            lowest_m = self.terrain.height_m
+            height_m = height_above_terrain_m(own_m, lowest_m)
+            rcs += ground_clutter_rcs_m2(
+                at_m, cells.elevation_rad, height_m, gamma_db=self.terrain.clutter_gamma_db,
+                azimuth_beamwidth_rad=azimuth, elevation_beamwidth_rad=elevation,
+                range_resolution_m=self.depth_m,
+            )  # fmt: skip
+            if self._two_way:
+                rcs += self._two_way * ground_ring_rcs_m2(
+                    at_m, height_m, gamma_db=self.terrain.clutter_gamma_db,
+                    range_resolution_m=self.depth_m,
+                )  # fmt: skip
+                rcs += self._two_way * altitude_line_of(self.block, at_m, height_m)
+        if self._per_m:
+            rcs += self._per_m * rain_volume_m3(
+                at_m, cells.elevation_rad, own_m + at_m * np.sin(cells.elevation_rad),
+                azimuth_beamwidth_rad=azimuth, elevation_beamwidth_rad=elevation,
+                range_resolution_m=self.depth_m, lowest_m=lowest_m,
+                highest_m=self._weather.rain_top_m,
+            )  # fmt: skip
+        return rcs
+
+    def range_rates(
+        self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Those of the ground, or along the beam, at the range that most of it comes from."""
+        _, at_m = self._of_prf(cells, self.block.p.prf_hz)
+        elevation = cells.elevation_rad
+        if self.terrain is not None:
+            height_m = cells.of_row("own_alt_m") - self.terrain.height_m
+            elevation = -np.arcsin(np.minimum(height_m / at_m, 1.0))
+        level = np.cos(elevation)
+        towards = (
+            level * np.cos(cells.azimuth_rad), level * np.sin(cells.azimuth_rad), -np.sin(elevation)
+        )  # fmt: skip
+        rate = -sum(own * part for own, part in zip(own_m_s, towards, strict=True))
+        speed_m_s = np.sqrt(sum(part * part for part in own_m_s))
+        platform = platform_spread_m_s(speed_m_s, rate, self.beam_rad[0])
+        moves_m_s = 0.0 if self.terrain is None else self.terrain.clutter_motion_m_s
+        return np.asarray(rate), np.hypot(moves_m_s, platform)
 
 
 def no_rain_echo(block: Any) -> str:

@@ -255,8 +255,8 @@ class RangeFolding(Effect[SeemingRange]):
     """Echoes of earlier pulses are taken for those of the last one.
 
     Of several PRFs those see a target that receive as much of it as the one that decides; the range
-    is where they agree. Echoes of ground and rain fold too: these are left out, and so are ghosts
-    between the echoes of two targets.
+    is where they agree. Echoes of ground and rain fold too (`FoldedClutter`); ghosts between the
+    echoes of two targets are left out.
     """
 
     name = "range folding"
@@ -289,16 +289,3 @@ class RangeFolding(Effect[SeemingRange]):
             )
 
         return seeming
-
-
-def folded_clutter(block: Any) -> list[str]:
-    """Say that echoes of ground and rain do not fold, where there are some and a target's do."""
-    terrain, weather = (block.context.sections.get(name) for name in ("terrain", "weather"))
-    ground = terrain is not None and terrain.height_m is not None
-    rain = weather is not None and weather.rain_rate_mm_h > 0
-    if not (block.p.range_folds and (ground or rain)):
-        return []
-    return [
-        "range_folds: echoes of ground and rain do not fold, clutter is that of a target's true "
-        "range: over ground nearer than that this radar sees too much"
-    ]

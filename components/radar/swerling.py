@@ -199,7 +199,14 @@ class SwerlingRadar(LinkBudgetRadar):
         if allowed is None:
             return math.inf
         steepness = self.steepest_pd()
-        others = {"aspect RCS", "beam shape", "rain echo", "sidelobe clutter"}
+        others = {
+            "aspect RCS",
+            "beam shape",
+            "rain echo",
+            "sidelobe clutter",
+            "folded clutter",
+            "multipath",
+        }
         others |= {effect.name for effect in WEATHER_EFFECTS}
         if steepness is None or others & set(self.context.effects):
             return 0.0

@@ -38,14 +38,16 @@ from components.radar.parameters import (
     moved_threshold,
 )
 from components.radar.radar import Radar
-from components.radar.rain import RainClutter, SidelobeClutter
+from components.radar.rain import FoldedClutter, RainClutter, SidelobeClutter
 from components.radar.rcs import MEAN_RCS, AspectRcs, constant_rcs_m2, mean_rcs_m2
-from components.radar.resolution import OneReportByCell, RangeFolding, folded_clutter
+from components.radar.resolution import OneReportByCell, RangeFolding
 from components.radar.timing import LOOK_ENERGY, TimeBudget, time_report
 from components.radar.weather import (
+    PROPAGATION,
     WEATHER_EFFECTS,
     BlindRange,
     Eclipsing,
+    Multipath,
     gas_left_out,
     rain_warnings,
 )
@@ -78,17 +80,19 @@ class LinkBudgetRadar(Radar):
 
     Parameters = LinkBudgetParameters
     inputs = CUED_INPUTS
-    hooks: ClassVar[tuple[Hook[Any], ...]] = (MEAN_RCS, LOOK_ENERGY, BEAM_SHAPE)
+    hooks: ClassVar[tuple[Hook[Any], ...]] = (MEAN_RCS, LOOK_ENERGY, BEAM_SHAPE, PROPAGATION)
     effects: ClassVar[tuple[Effect, ...]] = (
         AspectRcs(),
         *WEATHER_EFFECTS,
         BlindRange(),
         Eclipsing(),
         RangeFolding(),
+        Multipath(),
         BeamShape(),
         GroundClutter(),
         RainClutter(),
         SidelobeClutter(),
+        FoldedClutter(),
         DopplerFilter(),
         CellAveraging(),
         OneReportByCell(),
@@ -111,6 +115,7 @@ class LinkBudgetRadar(Radar):
         #: Each cell's mean RCS, m².
         self.mean_rcs_m2: CellValues = mean_rcs_m2
         self._beam_shape: CellValues | None = None
+        self._propagation: CellValues | None = None
         self._roster: Roster | None = None
 
     def setup(self) -> None:
@@ -119,6 +124,7 @@ class LinkBudgetRadar(Radar):
         self._echo_budget = self._without_blind_range()
         self.mean_rcs_m2 = self.built_one(MEAN_RCS) or constant_rcs_m2
         self._beam_shape = self.built_one(BEAM_SHAPE)
+        self._propagation = self.built_one(PROPAGATION)
         if self.built(CUE) and self.p.cued_dwell_factor is not None:
             self.snr_factors = [*self.snr_factors, dwell_factor(self.p)]
         self._set_threshold()
@@ -153,7 +159,8 @@ class LinkBudgetRadar(Radar):
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's mean SNR (linear), 0 closer than the minimum range (eq. 7-8)."""
-        return self.echo_snr(cells, values_of(self, self.mean_rcs_m2, cells))
+        snr = self.echo_snr(cells, values_of(self, self.mean_rcs_m2, cells))
+        return snr if self._propagation is None else snr * self._propagation(cells)
 
     def echo_snr(self, cells: Cells, rcs_m2: FloatArray) -> FloatArray:
         """Return each cell's SNR for the given cross-sections, with all losses on the way."""
@@ -292,7 +299,6 @@ class LinkBudgetRadar(Radar):
             *beam_against_gain(self.p),
             *rain_warnings(self),
             *gas_left_out(self),
-            *folded_clutter(self),
         ]
 
     def report(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Attenuation of a radar's echo by gas, rain and fog, the blind range, and eclipsing."""
+"""What weakens a radar's echo or lifts it on its way: weather, blind range, eclipsing, lobes."""
 
 import math
 from typing import Any, ClassVar
@@ -7,6 +7,7 @@ import numpy as np
 
 from components.arguments.units import SPEED_OF_LIGHT_M_S
 from components.atmosphere.attenuation import gas_specific_attenuation
+from components.atmosphere.rain_echo import HIGHEST_RAYLEIGH_HZ
 from components.atmosphere.slant_path import (
     AttenuationTable,
     attenuation_table,
@@ -14,7 +15,9 @@ from components.atmosphere.slant_path import (
     two_way_transmission,
 )
 from components.environment.tables import Weather
-from components.radar.rain import HIGHEST_RAYLEIGH_HZ, no_rain_echo
+from components.radar.ground_clutter import terrain_of
+from components.radar.rain import no_rain_echo
+from components.radar.resolution import cell_size
 from components.sensor.look import Cells, CellValues
 from components.sensor.weather_cells import (
     cells_verdict,
@@ -22,6 +25,7 @@ from components.sensor.weather_cells import (
     on_the_way,
     weather_cells,
 )
+from components.terrain.reflection import two_ray_factor
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
@@ -76,6 +80,46 @@ class Eclipsing(Effect[CellValues]):
         def factor(cells: Cells) -> FloatArray:
             decisive: FloatArray = p.decisive_share(p.shares(np.asarray(cells.range_m)))
             return decisive
+
+        return factor
+
+
+PROPAGATION = Hook("propagation", CellValues, "factor of each target's echo, and of no clutter's")
+
+
+class Multipath(Effect[CellValues]):
+    """Lobes by the ray that flat ground or sea mirrors (`two_ray_factor`)."""
+
+    name = "multipath"
+    acts_on = PROPAGATION
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask ``[terrain]`` for a height and a roughness."""
+        terrain = terrain_of(block)
+        if terrain is None:
+            return Verdict(False, "[terrain] height_m is not given")
+        if terrain.roughness_m is None:
+            return Verdict(False, "[terrain] roughness_m is not given")
+        return Verdict(True, f"[terrain] roughness_m is {terrain.roughness_m:g}")
+
+    def build(self, block: Any) -> CellValues:
+        """Return the factor on every target's echo."""
+        if not self.verdict(block).simulated:
+            return lambda cells: np.ones(len(cells))
+        terrain, (_, beam_rad, depth_m) = terrain_of(block), cell_size(block.p)
+        keys = {
+            "wavelength_m": block.wavelength_m,
+            "permittivity": terrain.permittivity(block.wavelength_m),
+            "polarisation": block.p.polarisation,
+            "roughness_m": terrain.roughness_m,
+            "elevation_beamwidth_rad": beam_rad,
+            "range_resolution_m": depth_m,
+        }
+
+        def factor(cells: Cells) -> FloatArray:
+            own_m = cells.of_row("own_alt_m") - terrain.height_m
+            far_m = np.maximum(cells.range_m, 1.0)
+            return np.asarray(two_ray_factor(far_m, own_m, cells.alt_m - terrain.height_m, **keys))
 
         return factor
 

@@ -18,7 +18,7 @@ from components.stone_soup.follower import Followed, Follower
 from components.stone_soup.library import Repeatable, require_stone_soup
 from components.tracking.out_of_sequence import LookCount, latest_s
 from components.tracking.promises import ACTS_EVERY_S, Promises
-from components.tracking.reported_errors import unknown_latency
+from components.tracking.reported_errors import folded_ranges, unknown_latency
 from components.tracking.scans import Scans, scans_of, split_due_looks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
@@ -112,7 +112,7 @@ class StoneSoupTracker(Component):
     def warnings(self) -> list[str]:
         """Say whose errors last from look to look, which Stone Soup takes for new ones."""
         offers = sensor_offers(self.context.producers)
-        said = unknown_latency(offers)
+        said = unknown_latency(offers) + folded_ranges(offers)
         for name, offer in sorted(offers.items()):
             lasting = offer.lasting if isinstance(offer, SensorOffer) else None
             if lasting is None or lasting:

@@ -238,6 +238,7 @@ class Active(CooperativeSensor):
         extras["address"][answered] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)
         extras["reported_alt_m"][answered] = now
         extras["reported_s"][answered] = cells.state_ns[answered] / NANOSECONDS
+        detected = self.of_others(cells, detected, extras["address"])
         if len(answered):
             extras["reported_climb_m_s"][answered] = self._climb(cells, answered, now)
         return Look(detected, probability, extras)

@@ -247,6 +247,7 @@ class AdsB(CooperativeSensor):
             placed = self.has_position(cells, reported, extras["reported_alt_m"][reported])
             detected[reported], reported = placed, reported[placed]
             moves[:, reported] = own_velocity(cells, reported)
+            detected = self.of_others(cells, detected, extras["address"])
         signal = {f"own_{axis}": moves[i] for i, axis in enumerate(("north", "east", "down"))}
         self._rows = cells.row, moves
         confidence = np.where(detected, equipage.nacp[cells.craft], 0.0)

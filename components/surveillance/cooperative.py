@@ -20,7 +20,7 @@ from components.sensor.sensor import Sensor
 from components.surveillance.reports import CooperativeReports
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Output
-from dsa_des.errors import Disagreements
+from dsa_des.errors import Disagreements, did_you_mean
 from dsa_des.record.undone import NO_COUNTS, with_cases
 
 #: Half of the time between positions that a velocity is of; a power of two.
@@ -55,6 +55,12 @@ class CooperativeParameters(SensorParameters):
         ge=0,
         description="Standard deviation of what reported pressure altitudes are from heights, as "
         "stated to trackers: those that carry errors of each aircraft estimate it, m.",
+    )
+
+    leaves_out: list[str] = Field(
+        default=[],
+        description="Names of aircraft whose reports are left out, known by their address: those "
+        "to which the tracks go, from another platform.",
     )
 
     @model_validator(mode="before")
@@ -144,8 +150,25 @@ class CooperativeSensor(Sensor):
         """Return how many received aircraft sent no altitude, and so have no position, by run."""
         return {**super().undone(), NO_CODE: self._unplaced}
 
+    def setup(self) -> None:
+        """Refuse to leave out whom there is not."""
+        super().setup()
+        names = [name for roster in known_targets(self.context) for name in roster.names]
+        for name in self.p.leaves_out if names else ():
+            if name not in names:
+                raise ValueError(f"leaves_out: there is no {name!r}{did_you_mean(name, names)}")
+
+    def of_others(self, cells: Cells, heard: BoolArray, address: IntArray) -> BoolArray:
+        """Return which cells are heard that have no address of an aircraft that is left out."""
+        roster = cells.roster
+        for name in self.p.leaves_out:
+            craft = np.full(len(cells), roster.names.index(name))
+            craft = craft if roster.is_shared else roster.craft(craft, cells.run)
+            heard = heard & (address != roster.equipage.address[craft])
+        return heard
+
     def has_position(self, cells: Cells, heard: IntArray, altitude_m: FloatArray) -> BoolArray:
-        """Return which received cells have a position: not those without an altitude.
+        """Return which of the cells that were heard are placed: one without an altitude is not.
 
         An altitude that no code has is not available (NaN).
         """

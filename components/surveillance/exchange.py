@@ -82,23 +82,19 @@ class PositionExchange(Component):
         )
         if states.flights is None:
             return None
-        here = [np.stack([getattr(states, f"own_{name}") for name in POSITION_FIELDS])]
-        here.append(np.stack([getattr(states, name) for name in POSITION_FIELDS]))
-        later_s = (wake.time_s + _STEP_S)[:, np.newaxis]
-        then = [
-            np.stack([getattr(of, name) for name in POSITION_FIELDS])
-            for of in states.flights(states.columns, later_s)
-        ]
-        own = here[0][:, :, np.newaxis]
-        own_mps = _way(own, then[0])[:, :, 0] / _STEP_S
-        velocity = _way(here[1], then[1]) / _STEP_S
-        position = _way(own, here[1])
-        roster = states.roster
-        own_key = target_keys((roster.own_name,))
-        mine = self._fix_errors(wake, np.broadcast_to(own_key, (len(wake), 1)))
-        theirs = self._fix_errors(
-            wake, np.broadcast_to(roster.keys_of(states.columns), states.present.shape)
+        everybody = _in_order(states)
+        velocities, position_errors, velocity_errors = states.flights.once(
+            f"fixes {self.p.position_m} {self.p.velocity_mps}",
+            (wake.ticks, wake.run, states.columns, everybody),
+            lambda: self._fixes(wake, states, everybody),
         )
+        viewer = _place(states)
+        others = np.arange(1, everybody.shape[2])
+        others[viewer - 1 : viewer] = 0  # the ownship is in the place of who looks
+        own_mps, velocity = velocities[:, :, viewer], velocities[:, :, others]
+        position = _way(everybody[:, :, [viewer]], everybody[:, :, others])
+        mine = position_errors[:, :, [viewer]], velocity_errors[:, :, [viewer]]
+        theirs = position_errors[:, :, others], velocity_errors[:, :, others]
         row, column = states.present.nonzero()
         apart = [(theirs[k] - mine[k])[:, row, column] for k in range(2)]
         position = position[:, row, column] + np.stack([*apart[0], 0.0 * row])
@@ -126,8 +122,25 @@ class PositionExchange(Component):
                 "alt_m": states.own_alt_m,
                 **dict(zip(("east_mps", "north_mps", "climb_mps"), own_mps, strict=True)),
             },
-            roster,
+            states.roster,
         )
+
+    def _fixes(
+        self, wake: Wake, states: TrafficStates, here: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return velocities of everybody (3, rows, aircraft), and errors of their fixes."""
+        assert states.flights is not None
+        flights = states.flights.seen_from(-1)
+        later = flights(states.columns, (wake.time_s + _STEP_S)[:, np.newaxis])
+        there = np.concatenate(
+            [np.stack([getattr(of, name) for name in POSITION_FIELDS]) for of in later], axis=2
+        )
+        roster, viewer = states.roster, states.flights.viewer
+        roster = roster if viewer < 0 else roster.seen_from(viewer)
+        keys = np.append(target_keys((roster.own_name,)), roster.keys_of(states.columns))
+        keys = np.broadcast_to(keys, here.shape[1:])
+        position_errors, velocity_errors = self._fix_errors(wake, keys)
+        return _way(here, there) / _STEP_S, position_errors, velocity_errors
 
     def _fix_errors(self, wake: Wake, keys: AnyArray) -> list[FloatArray]:
         """Return errors of position and of velocity, (2, rows, aircraft) each: east and north."""
@@ -142,6 +155,23 @@ class PositionExchange(Component):
             .reshape(shape)
             for k, scale in enumerate(scales)
         ]  # fmt: skip
+
+
+def _place(states: TrafficStates) -> int:
+    """Return the place of who looks among everybody, the ownship first."""
+    assert states.flights is not None
+    viewer = states.flights.viewer
+    return 0 if viewer < 0 else int(np.searchsorted(states.columns, viewer)) + 1
+
+
+def _in_order(states: TrafficStates) -> FloatArray:
+    """Return positions of everybody (3, rows, aircraft), the ownship first whoever looks."""
+    own = np.stack([getattr(states, f"own_{name}") for name in POSITION_FIELDS])
+    targets = np.stack([getattr(states, name) for name in POSITION_FIELDS])
+    everybody = np.concatenate([own[:, :, np.newaxis], targets], axis=2)
+    viewer = _place(states)
+    everybody[:, :, [0, viewer]] = everybody[:, :, [viewer, 0]]
+    return everybody
 
 
 def _way(here: FloatArray, there: FloatArray) -> FloatArray:

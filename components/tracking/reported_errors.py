@@ -47,6 +47,17 @@ def unknown_latency(offers: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def folded_ranges(offers: Mapping[str, Any]) -> list[str]:
+    """Return whose ranges fold, which a tracker takes for true."""
+    return [
+        f"ranges of {name} fold at {offer.ambiguous_m / 1000.0:.4g} km, and are taken for true: a "
+        "target beyond is tracked where it seems to be; other_prfs_hz would resolve it"
+        for name, offer in sorted(offers.items())
+        if isinstance(offer, SensorOffer)
+        and offer.ambiguous_m < (math.inf if offer.reach is None else offer.reach.range_max_m)
+    ]
+
+
 def coarse_bearings(offers: Mapping[str, Any]) -> list[str]:
     """Return whose bearings are so coarse beside their ranges that targets lie on arcs."""
     return [

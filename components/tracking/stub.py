@@ -13,7 +13,7 @@ from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPo
 from components.messages.tracks import Tracks, TracksWithPose
 from components.navigation.errors import navigation_errs
 from components.sensor.marks import TRACKER
-from components.tracking.reported_errors import unknown_latency
+from components.tracking.reported_errors import folded_ranges, unknown_latency
 from dsa_des.arrays.entries import cells_of
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -91,7 +91,8 @@ class TrackerStub(Component):
 
     def warnings(self) -> list[str]:
         """Say whose measurements lie behind their targets."""
-        return super().warnings() + unknown_latency(sensor_offers(self.context.producers))
+        offers = sensor_offers(self.context.producers)
+        return super().warnings() + unknown_latency(offers) + folded_ranges(offers)
 
     def run(self, wake: Wake) -> Tracks | None:
         """Take in new measurements and report what is held."""

@@ -33,6 +33,7 @@ from components.tracking.promises import ACTS_EVERY_S, Silence
 from components.tracking.reported_errors import (
     coarse_bearings,
     errors_by_sensors,
+    folded_ranges,
     unknown_latency,
 )
 from components.tracking.rules import TrackerParameters, TrackerRules, range_rate_refusal
@@ -170,7 +171,7 @@ class Tracker(Component):
                 )
         if not self._estimator.errors:
             result += unknown_latency(offers)
-        return super().warnings() + result + coarse_bearings(offers)
+        return super().warnings() + result + coarse_bearings(offers) + folded_ranges(offers)
 
     def offer(self, port: str) -> Any:
         """Hand on what the sensors say of themselves; with ranges where directions give them."""

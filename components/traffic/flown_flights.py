@@ -5,7 +5,7 @@ What each row holds is what a run alone would give, to the bit; a single run is 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from components.geometry import TrajectoryState
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run
-from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
 
@@ -118,6 +118,7 @@ class FlownFlights:
     intervals: Mapping[int, NearIntervals] = field(default_factory=dict)
     rates_hz: FloatArray | None = None
     unseen: tuple[int, ...] = ()
+    _made: dict[str, tuple[Any, Any]] = field(default_factory=dict, init=False)
 
     @classmethod
     def of(cls, own: Fleet, targets: Fleet, platforms: Sequence[int]) -> FlownFlights:
@@ -197,21 +198,38 @@ class FlownFlights:
         known of them but for manoeuvres and the wind. Of manoeuvres the first `known` (n,
         platforms) count, or all.
         """
+        if not (steered := self.steered_targets):
+            return self._as_scripted(target, time_s, state)
+        run, column = np.divmod(target, self.width)
+        left = np.flatnonzero(~np.isin(column, list(steered)))
+        known_of = None if state is None else state.taken(left)
+        rows, states = [left], [self._as_scripted(target[left], time_s[left], known_of)]
+        for place, index in enumerate(self.platforms):
+            if index in steered and len(mine := np.flatnonzero(column == index)):
+                counts = None if known is None else known[mine, place]
+                rows.append(mine)
+                states.append(self.platform_at(index, run[mine], time_s[mine], counts))
+        return assemble_rows(rows, states)
+
+    def _as_scripted(
+        self, target: IntArray, time_s: FloatArray, state: TrajectoryState | None
+    ) -> TrajectoryState:
+        """Return the states of targets without their manoeuvres, as in `targets_at`."""
         state = self.targets.each(target, time_s) if state is None else state
         for crabbing in self.crabbing:
             speed_mps = self.targets.ground_speeds_mps(target, time_s)
             state = crabbing(state, speed_mps, self.targets.fixed_attitudes_rad(target, time_s))
-        if not (steer := self.steered_targets):
-            return state
-        run, column = np.divmod(target, self.width)
-        values = [part.copy() for part in state.arrays()]
-        for place, index in enumerate(self.platforms):
-            if index in steer and len(mine := np.flatnonzero(column == index)):
-                counts = None if known is None else known[mine, place]
-                flown = self.platform_at(index, run[mine], time_s[mine], counts)
-                for part, new in zip(values, flown.arrays(), strict=True):
-                    part[mine] = new
-        return TrajectoryState(*values)
+        return state
+
+    def once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
+        """Return what was made under a name of equal arrays, or make it; the last one is kept.
+
+        Those who look from several platforms ask for the same of all aircraft.
+        """
+        known = self._made.get(name)
+        if known is None or not all(map(np.array_equal, known[0], of)):
+            known = self._made[name] = of, make()
+        return known[1]
 
     def states(
         self,
@@ -225,7 +243,6 @@ class FlownFlights:
         """Return states of who looks and of targets; see `messages.known_flights.AllFlights`."""
         time_s = self._published_s(run, time_s) + ahead_s
         shape = np.broadcast_shapes(time_s.shape, run.shape, columns.shape)
-        looking = self._looking(viewer, run, known, time_s)
         target, times, runs = (
             np.broadcast_to(of, shape).reshape(-1)
             for of in (run * self.width + columns, time_s, run)
@@ -233,12 +250,17 @@ class FlownFlights:
         counts = None
         if self.steered_targets:
             counts = np.broadcast_to(known, (*shape, known.shape[-1])).reshape(len(times), -1)
-        others = self.targets_at(target, times, known=counts)
-        if viewer >= 0:  # the two have changed places
-            places = np.broadcast_to(columns, shape).reshape(-1)
-            mine = np.flatnonzero(places == viewer)
+        key = target, times, known
+        others = self.once("targets", key, lambda: self.targets_at(target, times, known=counts))
+        mine = np.flatnonzero(np.broadcast_to(columns, shape).reshape(-1) == viewer)
+        if len(mine) != time_s.size or viewer < 0:
+            looking = self._looking(viewer, run, known, time_s)
+        else:
+            looking = others.taken(mine).reshaped(time_s.shape)
+        if len(mine):  # the two have changed places
             counts = np.broadcast_to(known[..., 0], shape).reshape(-1)[mine]
-            own = self.platform_at(-1, runs[mine], times[mine], counts)
+            key = runs[mine], times[mine], counts
+            own = self.once("own", key, lambda: self.platform_at(-1, *key))
             values = [part.copy() for part in others.arrays()]
             for part, new in zip(values, own.arrays(), strict=True):
                 part[mine] = new

@@ -39,6 +39,7 @@ from components.traffic.flown_flights import (
     Coming,
     FlightsOfRuns,
     FlownFlights,
+    WithOthers,
     arrived_manoeuvres,
     due_manoeuvres,
     steer,
@@ -379,28 +380,33 @@ class TrafficSource(Component):
         raise TypeError(f"{type(self).__name__} does not say when its samples are")
 
     def report(self) -> dict[str, Any]:
-        """Return the closest approach of every target over the run.
+        """Return the closest approach of every target over the run."""
+        return {"targets": self.approaches()}
 
-        ``at`` says where it is the first or the last instant that was looked at: the aircraft
-        may have been nearer before, or come nearer after.
+    def approaches(self, platform: str = "") -> dict[str, Any]:
+        """Return the closest approach over the run of everybody whom a platform may see, by name.
+
+        By default that is the ownship. ``at`` says where it is the first or the last instant that
+        was looked at: the aircraft may have been nearer before, or come nearer after.
         """
-        end_s = float(self.context.duration_s)
-        names = self.roster.names
+        end_s, viewer = float(self.context.duration_s), self._index(platform)
+        own, targets, names = self.own, self.targets, [*self.roster.names]
+        if viewer >= 0:  # it and the ownship change places
+            own, names[viewer] = targets[viewer], self.roster.own_name
+            targets = WithOthers(targets, len(targets), {viewer: self._flown.own})
         times = self._compared_at(end_s)
         between = not self._seeks_at_samples
-        best = approaches_of_run(self.own, self.targets, times, end_s, between=between)
-        where = censored_approaches(self, times, best.time_s, end_s)
+        best = approaches_of_run(own, targets, times, end_s, between=between)
+        where = censored_approaches(own, targets, times, best.time_s, end_s)
         closest = zip(names, best.time_s.tolist(), best.range_m.tolist(), where, strict=True)
-        approaches = {
-            name: {"time_s": time_s, "range_m": range_m, **({"at": at} if at else {})}
+        approaches = [
+            (name, {"time_s": time_s, "range_m": range_m, **({"at": at} if at else {})})
             for name, time_s, range_m, at in closest
-        }
+        ]
         return {
-            "targets": {
-                name: {"closest_approach": one if math.isfinite(one["range_m"]) else None}
-                for place, (name, one) in enumerate(approaches.items())
-                if place not in self.unseen
-            }
+            name: {"closest_approach": one if math.isfinite(one["range_m"]) else None}
+            for place, (name, one) in enumerate(approaches)
+            if place == viewer or place not in self.unseen
         }
 
     @property

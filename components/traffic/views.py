@@ -65,18 +65,17 @@ class View:
 
     def near_targets(
         self, flown: FlownFlights, run: IntArray, time_s: FloatArray
-    ) -> tuple[TrajectoryState, IntArray, BoolArray | None]:
-        """Return the state of who looks at each row, which targets may come in its reach, and when
-        (rows, targets); None for always.
+    ) -> tuple[TrajectoryState | None, IntArray, BoolArray | None]:
+        """Return the state of the ownship, if it looks, at each row, which targets may come in the
+        reach of who looks, and when (rows, targets); None for always.
         """
         every, lasts_s, one_run = np.arange(self._width), self.look.lasts_s, len(flown.own) == 1
         if self.epochs is not None:
-            own, near = self.epochs.states_and_near(flown.platforms[self.viewer], run, time_s)
+            state, near = self.epochs.states_and_near(flown.platforms[self.viewer], run, time_s)
             near[:, self._steered] = True
             columns = np.flatnonzero(near.any(axis=0)) if one_run else every
-            own = flown.platform_at(self.viewer, run, time_s, state=own)
-            return own, columns, near[:, columns]
-        own = flown.platform_at(self.viewer, run, time_s)
+            return self._own(flown, run, time_s, state), columns, near[:, columns]
+        own = self._own(flown, run, time_s)
         if self.intervals is None:
             return own, every, None
         if one_run:
@@ -89,6 +88,16 @@ class View:
         near = self.intervals.holds(each, times, times + lasts_s)
         return own, every, near.reshape(len(time_s), len(every))
 
+    def _own(
+        self,
+        flown: FlownFlights,
+        run: IntArray,
+        time_s: FloatArray,
+        state: TrajectoryState | None = None,
+    ) -> TrajectoryState | None:
+        """Return the state of the ownship; other platforms are moved as targets are."""
+        return flown.platform_at(-1, run, time_s, state=state) if self.viewer < 0 else None
+
 
 class Seen:
     """Who may see whom at the rows of a wake: the ownship first, then the other platforms."""
@@ -99,6 +108,7 @@ class Seen:
         self._width, self._views, self._unseen = flown.width, views, flown.unseen
         self._near = {view.viewer: view.near_targets(flown, run, time_s) for view in views}
         own, columns, _ = self._near[-1]
+        assert own is not None
         #: The state of the ownship at each row, and which targets are to be moved.
         self.own = own
         self.columns: IntArray = columns

@@ -12,6 +12,7 @@ from dsa_des.commands.group import plain_errors
 @click.option(
     "--out", metavar="FILE.html", help="The page [default: beside the first RUN, named as all are]."
 )
+@click.option("--platform", metavar="NAME", help="Show what one of several platforms has.")
 @plain_errors
 def view(**options: Any) -> None:
     """Make a page that replays RUN: plan, altitudes, scans, detections, tracks, alerts.

@@ -16,11 +16,11 @@ from dsa_des.terminal.terminal import say
 _MOST = 3
 
 
-def make_view(runs: tuple[str, ...], out: str | None) -> None:
+def make_view(runs: tuple[str, ...], out: str | None, platform: str | None) -> None:
     """Write the page of runs' folders or of ``.daa`` files; ``dsa-des view``."""
     if len(runs) > _MOST:
         raise UsageError(f"{len(runs)} runs: at most {_MOST} stand beside each other")
-    pictures = [_picture(Path(run)) for run in runs]
+    pictures = [_picture(Path(run), platform) for run in runs]
     if len(pictures) == 1:
         page = page_text(pictures[0])
     else:
@@ -45,17 +45,19 @@ def _default_page_path(runs: tuple[str, ...]) -> Path:
     return paths[0].with_name(f"{'-'.join(names)}.html")
 
 
-def _picture(source: Path) -> RunPicture:
+def _picture(source: Path, platform: str | None) -> RunPicture:
     if source.is_dir():
         try:
             with np.errstate(invalid="ignore", over="ignore"):
-                return run_picture(source)
+                return run_picture(source, platform)
         except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
             # Any of its files may be another program's: what they lack is met anywhere.
             raise UsageError(
                 f"{source}: its tables are not those of a run ({str(error)[:200]})"
             ) from error
     if source.suffix == ".daa" and source.is_file():
+        if platform is not None:
+            raise UsageError(f"{source}: --platform: a .daa file holds flights; nobody has sensors")
         return encounter_picture(source)
     if source.exists():
         raise UsageError(f"{source}: is neither a run's folder nor a .daa file")

@@ -10,13 +10,13 @@ import numpy as np
 
 from components.display.picture import LINE, TangentPlane, offset_positions, sights
 from components.display.recorded_run import POSE, RecordedTables, read_table
-from components.display.symbols import block_marks
+from components.display.symbols import block_marks, in_colours, platform_colours
 from components.formats.daa_file import read_daa_samples
 from components.formats.text_rows import TrafficFileError
 from components.messages.alerts import BAND_REGIONS
 from components.messages.columns import ORIGIN, POSITION
 from components.view.page import RunPicture
-from dsa_des.arrays.types import AnyArray, FloatArray
+from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.mark import Mark
 from dsa_des.errors import UsageError
 
@@ -29,8 +29,11 @@ _TABLES = (
 _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
 
 
-def run_picture(folder: Path) -> RunPicture:
-    """Return the page's picture of a run; `UsageError` where the folder holds none."""
+def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
+    """Return the page's picture of a run; `UsageError` where the folder holds none.
+
+    It is what all platforms have, or what one of several has, seen from there.
+    """
     info = _json(folder / "run.json")
     if "duration_s" not in info:
         raise UsageError(f"{folder}: holds no run: run.json has no duration_s")
@@ -40,19 +43,28 @@ def run_picture(folder: Path) -> RunPicture:
     run = RecordedTables(
         folder, {n: read_table(path) for n, path in paths.items() if path.is_file()}
     )
+    carrying = run.carrying
+    first = platform or next(iter(carrying.values()), None)
+    if platform is not None:
+        run = run.seen_from(platform)
     known = ("truth", "detections", "alerts")
     names = sorted({text for table in known for text in _texts(run, table, "target")})
     targets = {name: number for number, name in enumerate(names)}
-    own_s, own = _ownship_poses(run)
+    poses = _Poses(run, first)
+    own_s, own = poses.of(None)
     plane = TangentPlane(float(own[0, 0]), float(own[1, 0])) if len(own_s) else _NOWHERE
     sensors = sorted(_texts(run, "scans", "block") | _texts(run, "detections", "block"))
-    marks = block_marks(run.block_types(sensors))
+    colours = platform_colours(carrying.values())
+    marks = in_colours(block_marks(run.block_types(sensors)), carrying, colours)
     blocks = run.scene.get("blocks", {})
     picture = RunPicture(
         title=str(run.scene.get("title") or folder.name),
-        facts=_facts(info, run.scene),
+        facts=_facts(info, run.scene) | ({} if platform is None else {"seen from": platform}),
         duration_s=float(info["duration_s"]),
-        sensors=[_sensor(name, blocks.get(name, {}), marks[name]) for name in sensors],
+        sensors=[
+            _sensor(name, blocks.get(name, {}), marks[name], carrying.get(name), first)
+            for name in sensors
+        ],
         targets=names,
     )
 
@@ -86,13 +98,13 @@ def run_picture(folder: Path) -> RunPicture:
                 **about(name),
                 **plain(name, "age_s"),
                 "time_s": time_s,
-                **_lines_of_sight(run, name, _pose_at(own_s, own, time_s), plane),
+                **_lines_of_sight(run, name, poses.at(name, time_s), plane),
             }
     if "tracks" in tables:
         picture.trackers = _blocks(run, "tracks")
     if "state_tracks" in run.tables:
         picture.trackers = _blocks(run, "state_tracks")
-        tables["tracks"] = _estimates(run, picture.trackers, own_s, own, plane)
+        tables["tracks"] = _estimates(run, picture.trackers, poses, plane)
     if "alerts" in run.tables:
         tables["alerts"] = {
             **about("alerts"), "time_s": run.numbers("alerts", "time_s"),
@@ -164,9 +176,18 @@ def _facts(info: dict[str, Any], scene: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in facts.items() if value not in (None, "")}
 
 
-def _sensor(name: str, block: dict[str, Any], mark: Mark) -> dict[str, Any]:
-    """Return how a sensor is shown, and its field of view as far as the scene says it."""
+def _sensor(
+    name: str, block: dict[str, Any], mark: Mark, on: str | None, first: str | None
+) -> dict[str, Any]:
+    """Return how a sensor is shown, and its field of view as far as the scene says it.
+
+    `on` is what carries it, where there are several; fields of view are drawn about the `first`.
+    """
     result: dict[str, Any] = {"name": name, "colour": mark.colour, "marker": mark.marker}
+    if on is not None:
+        result["on"] = on
+    if on != first:
+        return result
     limits = block.get("azimuth_deg")
     if isinstance(limits, list) and len(limits) == 2:
         turned = float(block.get("mount_azimuth_deg", 0.0))
@@ -181,16 +202,49 @@ def _sensor(name: str, block: dict[str, Any], mark: Mark) -> dict[str, Any]:
     return result
 
 
-def _ownship_poses(run: RecordedTables) -> tuple[FloatArray, FloatArray]:
-    """Return the ownship's poses (6, n) and their times, in order: the truth, or its belief."""
-    table, names, rows = "detections", list(POSE), np.arange(run.tables["detections"].num_rows)
-    true = [name.removeprefix("own_") for name in POSE]
-    if run.has("truth", *true):
-        mine = np.array([name is None for name in run.texts("truth", "target")], dtype=bool)
-        if mine.any():
-            table, names, rows = "truth", true, np.flatnonzero(mine)
-    time_s, first = np.unique(run.numbers(table, "time_s")[rows], return_index=True)
-    return time_s, run.stack_columns(table, names, rows[first])
+class _Poses:
+    """Where the ownship was, and other platforms: poses (6, n) and their times, in order."""
+
+    def __init__(self, run: RecordedTables, first: str | None) -> None:
+        self._run, self._first = run, first
+        self._known: dict[str | None, tuple[FloatArray, FloatArray]] = {}
+
+    def of(self, platform: str | None) -> tuple[FloatArray, FloatArray]:
+        """Return one's poses, the ownship's of None: the truth, or what it believed."""
+        if platform not in self._known:
+            self._known[platform] = self._read(platform)
+        return self._known[platform]
+
+    def _read(self, platform: str | None) -> tuple[FloatArray, FloatArray]:
+        run, true = self._run, [name.removeprefix("own_") for name in POSE]
+        if run.has("truth", *true):
+            mine = np.array([name == platform for name in run.texts("truth", "target")], dtype=bool)
+            if mine.any():
+                return self._in_order("truth", true, np.flatnonzero(mine))
+        rows = np.arange(run.tables["detections"].num_rows)
+        if run.has("detections", "platform"):
+            on = run.texts("detections", "platform")
+            rows = np.flatnonzero(np.array([one == (platform or self._first) for one in on]))
+        return self._in_order("detections", list(POSE), rows)
+
+    def _in_order(
+        self, table: str, names: list[str], rows: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        time_s, first = np.unique(self._run.numbers(table, "time_s")[rows], return_index=True)
+        return time_s, self._run.stack_columns(table, names, rows[first])
+
+    def at(self, table: str, time_s: FloatArray, rows: IntArray | None = None) -> FloatArray:
+        """Return the latest poses, at some times, of what carries the blocks of a table's rows."""
+        if not self._run.has(table, "platform"):
+            return _pose_at(*self.of(None), time_s)
+        on = np.array(self._run.texts(table, "platform"), dtype=object)
+        on = on if rows is None else on[rows]
+        result = np.full((len(POSE), len(time_s)), np.nan)
+        for name in {*on.tolist()}:
+            mine = np.flatnonzero(on == name)
+            poses = self.of(None if name == self._first else name)
+            result[:, mine] = _pose_at(*poses, time_s[mine])
+        return result
 
 
 def _ownship_columns(
@@ -227,8 +281,7 @@ def _truth(
 def _estimates(
     run: RecordedTables,
     trackers: list[str],
-    own_s: FloatArray,
-    own: FloatArray,
+    poses: "_Poses",
     plane: TangentPlane,
 ) -> dict[str, AnyArray]:
     """Return estimated states of tracks that live, along the plane's axes."""
@@ -242,7 +295,7 @@ def _estimates(
     origin = run.stack_columns("state_tracks", ORIGIN, keep)
     ends = offset_positions(run.stack_columns("state_tracks", POSITION, keep), origin)
     east, north = plane.east_north_m(*ends)
-    from_east, from_north = plane.east_north_m(*_pose_at(own_s, own, time_s)[:3])
+    from_east, from_north = plane.east_north_m(*poses.at("state_tracks", time_s, keep)[:3])
     turned = plane.turned_rad(origin)
     c, s = np.cos(turned), np.sin(turned)
     v_north, v_east = column("north_m_s"), column("east_m_s")

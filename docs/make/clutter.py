@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from components.arguments.units import SPEED_OF_LIGHT_M_S
+from components.atmosphere.rain_echo import rain_reflectivity_per_m, rain_volume_m3
 from components.radar.detection.cfar import cfar_loss_db
 from components.radar.doppler import MovingTargetFilter
-from components.radar.rain import rain_reflectivity_per_m, rain_volume_m3
 from components.thesis.drawing import GREY, legend_below, panels
 from components.thesis.drawing import RADAR as RADAR_COLOUR
 from docs.make.stamp import stamped

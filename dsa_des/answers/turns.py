@@ -5,15 +5,19 @@ by that of the scene as it is *in the same turn*. The turns follow from the stud
 rows of a chunk from the chunk: any number of workers gives the same.
 """
 
+import json
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from dsa_des.costs.replay import median_and_spread
+from dsa_des.errors import UsageError
+from dsa_des.files.output_file import write_file
 from dsa_des.results.folder import StudyFolder
 from dsa_des.studies.executors import Executor
 from dsa_des.studies.study import Chunk, Study
@@ -61,6 +65,26 @@ class TurnTimes:
     cpu_s: dict[tuple[int, int], float] = field(default_factory=dict)
     runs: dict[tuple[int, int], int] = field(default_factory=dict)
 
+    def keep(self, path: Path, turns: int) -> None:
+        """Write the times of turns that are finished, and how many turns there are in all."""
+        taken = [[*key, self.cpu_s[key], self.runs[key]] for key in sorted(self.runs)]
+        write_file(path, json.dumps({"turns": turns, "taken": taken}).encode())
+
+    def take_up(self, path: Path) -> tuple[int, int] | None:
+        """Read what an earlier attempt kept: turns that are finished, and in all; or None."""
+        try:
+            content = json.loads(path.read_bytes())
+            turns = int(content["turns"])
+            for turn, model, cpu_s, runs in content["taken"]:
+                self.cpu_s[int(turn), int(model)] = float(cpu_s)
+                self.runs[int(turn), int(model)] = int(runs)
+        except FileNotFoundError:  # not one turn was finished
+            return None
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            said = "is damaged; without it all turns are run again"
+            raise UsageError(f"{path}: {said}") from error
+        return 1 + max(self.runs)[0], turns
+
     def per_run_ms(self, model: int) -> tuple[float, float]:
         """Return the median over turns, and half the distance between the quartiles."""
         each = [1e3 * self.cpu_s[key] / self.runs[key] for key in sorted(self.cpu_s)
@@ -87,11 +111,13 @@ def run_in_turns(
     turn_times: TurnTimes,
     begun: Callable[[float], None],
     after: Callable[[int], Sequence[int]],
+    done: int = 0,
 ) -> None:
     """Run all models of a study, whose last axis they are, into its open folder.
 
     `begun` is told how long the scene as it is took in the first turn; `after` is told after each
-    turn how many are done, and returns the models to go on with. `turn_times` is filled on the way.
+    turn how many are done, and returns the models to go on with. `turn_times` is filled on the way;
+    it holds those of turns that were `done` before.
     """
     models, parts = len(study.axes[-1].labels), folder.destination
 
@@ -107,6 +133,9 @@ def run_in_turns(
             key = turn, int(done.name.rpartition("-")[2])
             turn_times.cpu_s[key], turn_times.runs[key] = done.cpu_s, done.runs
 
+    left: Sequence[int] = after(done) if done else range(models)
+    if done == len(batches):
+        return
     # What a process does once, imports and compiled code, is nobody's time: all run one run first.
     cell, start, _ = batches[0][0]
     warm = [
@@ -115,8 +144,7 @@ def run_in_turns(
     ]
     for _ in executor.run(study, parts, warm):
         pass
-    left: Sequence[int] = range(models)
-    for turn in range(len(batches)):
+    for turn in range(done, len(batches)):
         if turn == 0:
             run(0, [0])
             begun(turn_times.cpu_s[0, 0])

@@ -42,13 +42,16 @@ def cost_of_accuracy(
     as_json: bool,
     listed: tuple[str, ...] = (),
     workers: int | None = None,
+    resume: bool = False,
+    no_figures: bool = False,
 ) -> None:
     """Climb the ladders of a scene's blocks, write tables and figures, and print the rows.
 
     After ctrl-C the ladders that are finished are kept; exit code 130.
     """
-    if listed or workers is not None:
-        option = f"--vary {listed[0]}" if listed else f"--workers {workers}"
+    if listed or workers is not None or resume:
+        option = "--resume" if workers is None else f"--workers {workers}"
+        option = f"--vary {listed[0]}" if listed else option
         raise UsageError(f"{option}: goes with --answer RESULT of a study")
     repeats = repeats or _REPEATS
     if map_name is not None:
@@ -94,7 +97,8 @@ def cost_of_accuracy(
             stopped = True
         rows = [cost.row() for cost in costs]
         write_table(folder / "cost.parquet", rows)
-        draw_costs(folder / "cost.png", variants.scene.title, costs)
+        if not no_figures:
+            draw_costs(folder / "cost.png", variants.scene.title, costs)
         if whole_chain and not stopped:
             from dsa_des.costs.chain import draw_chain, run_chain
 
@@ -103,7 +107,8 @@ def cost_of_accuracy(
             notes.append(picked)
             write_table(folder / "chain.parquet", chain)
             label = compare.difference.label
-            draw_chain(folder / "chain.png", variants.scene.title, chain, label)
+            if not no_figures:
+                draw_chain(folder / "chain.png", variants.scene.title, chain, label)
         content: dict[str, Any] = {"rows": rows, "notes": notes}
         if chain:
             content["chain"] = chain

@@ -2,22 +2,28 @@
 
 import csv
 import io
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from dsa_des.answers.alternatives import Alternatives, comparable, find_alternatives, with_models
 from dsa_des.answers.changes import changes_by_model
+from dsa_des.answers.figure import draw_answers
 from dsa_des.answers.report import AnswerReport, print_report
 from dsa_des.answers.turns import Batch, TurnTimes, run_in_turns, turns_of
 from dsa_des.answers.verdicts import BEYOND, NOTHING, OPEN, Limit, parse_limits
 from dsa_des.commands.cost import CostProgress
-from dsa_des.commands.study import check_workers, options_as_sets, result_names
+from dsa_des.commands.study import (
+    begun_or_empty,
+    check_workers,
+    options_as_sets,
+    result_names,
+    stop_with,
+    target_of,
+)
 from dsa_des.costs.output import write_table
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
-from dsa_des.files.output_folder import OutputFolder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.record import Result
@@ -28,9 +34,10 @@ from dsa_des.studies.identity import description_text, results_of
 from dsa_des.studies.study import Study, command_of
 from dsa_des.studies.study_file import read_study
 from dsa_des.terminal.terminal import say, say_json
+from dsa_des.text.safe_text import shell_line
 
-#: Where a study's folder of all runs stands in that of the command.
-_RUNS = "study"
+#: Where a study's folder of all runs stands in that of the command, and what the turns took.
+_RUNS, _TURNS = "study", "turns.json"
 
 
 def cost_at_the_answer(
@@ -50,10 +57,12 @@ def cost_at_the_answer(
     against: str | None,
     whole_chain: bool,
     map_name: str | None,
+    resume: bool,
+    no_figures: bool,
 ) -> None:
     """Run a study with each model in turn, write the tables and print the verdicts.
 
-    After ctrl-C the turns that are finished are kept; exit code 130.
+    After ctrl-C what is finished is told and kept, to be resumed; exit code 130.
     """
     for option, given in (("--against", against), ("--all", whole_chain), ("--map", map_name)):
         if given:
@@ -67,37 +76,45 @@ def cost_at_the_answer(
     sets = (*sets, *options_as_sets(swaps, seed, None))
     sets = sets if duration is None else (*sets, f"set.duration_s={duration}")
     described = read_study(path, sets=sets)
-    words = ["cost", *(word for name in answers for word in ("--answer", name))]
-    words += [word for text in listed for word in ("--vary", text)]
-    described.repeat = command_of(words, sets, described.path)
+    words = _words("answer", answers) + _words("vary", listed) + _words("budget", budgets)
+    words += _words("block", [block] if block else [])
+    words += _words("repeats", [str(repeats)] if repeats else [])
+    described.repeat = command_of(["cost", *words], sets, described.path)
     answer = AnswerOfStudy(described, answers, block, listed, budgets, repeats)
-    target = OutputFolder.from_option(out, Path("runs"), f"{path.stem}-cost")
+    target = target_of(Path("runs"), f"{path.stem}-cost", out, resume)
+    begun_or_empty(target, resume, "what was begun there")
+    folder = target if isinstance(target, Path) else target()
+    words += [*_words("workers", [str(workers)] if workers else []), "--out", str(folder)]
+    words += ["--no-figures"] * no_figures + ["--json"] * as_json + _words("set", sets)
+    again = shell_line(["dsa-des", "cost", "--resume", *words, "--", scene])
     progress = CostProgress(silent=as_json)
-    workers = workers or default_workers()
-    with target.writing() as folder:
-        stopped = answer.run(folder / _RUNS, workers, progress)
-        report = answer.report()
-        if stopped and not report.changes:
-            raise KeyboardInterrupt
-        rows = report.rows()
+    stopped = answer.run(folder, workers or default_workers(), progress, resume)
+    if stopped and not answer.has_changes():
+        stop_with("interrupted in the first turn", again, 130)
+    report = answer.report()
+    rows = report.rows()
+    said = {name: report.sentences(name) for name in report.verdicts}
+    content: dict[str, Any] = {"rows": rows, "sentences": said, "notes": report.notes_on_tables()}
+    try:
         write_table(folder / "answer.parquet", rows)
         write_file(folder / "answer.csv", _csv(rows))
-        said = {name: report.sentences(name) for name in report.verdicts}
-        content: dict[str, Any] = {
-            "rows": rows,
-            "sentences": said,
-            "notes": report.notes_on_tables(),
-        }
+        if not no_figures:
+            draw_answers(folder / "answer.png", report)
         write_run_json(folder, {"title": described.title, "cost": content})
+    except OSError as error:
+        raise UsageError(f"{folder}: cannot be written: {error.strerror or error}") from error
     if as_json:
         say_json(rows)
     else:
         print_report(report)
         say()
-        say(f"{target.path}: {', '.join(sorted(one.name for one in target.path.iterdir()))}")
+        say(f"{folder}: {', '.join(sorted(one.name for one in folder.iterdir()))}")
     if stopped:
-        say(f"stopped: interrupted; {answer.done_text()} are kept", err=True)
-        sys.exit(130)
+        stop_with(f"interrupted after {answer.done_text()}", again, 130)
+
+
+def _words(option: str, values: Sequence[str]) -> list[str]:
+    return [word for value in values for word in (f"--{option}", value)]
 
 
 class AnswerOfStudy:
@@ -137,6 +154,7 @@ class AnswerOfStudy:
                 *(f"  {note}" for note in found.notes),
             )
         self.study = with_models(plain, found.these)
+        self._repeats = repeats
         self._batches: list[Batch] = turns_of(self.study, repeats)
         self.turn_times = TurnTimes()
         self._failed: dict[str, str] = {}
@@ -155,17 +173,14 @@ class AnswerOfStudy:
         """How many intervals hold together: models by results by places."""
         return len(self._found.these) * len(self._results) * self._places
 
-    def run(self, path: Path, workers: int, progress: CostProgress) -> bool:
-        """Run all turns into a study's folder; return whether ctrl-C ended it."""
+    def run(
+        self, path: Path, workers: int, progress: CostProgress, resume: bool = False
+    ) -> bool:  # fmt: skip
+        """Run all turns, or those that are left, into a folder; return whether ctrl-C ended it."""
         executor = make_executor("local", workers, None)
-        folder = self._folder = StudyFolder(path)
-        models, turns = len(self._found.these), len(self._batches)
+        folder = self._folder = StudyFolder(path / _RUNS)
+        models = len(self._found.these)
         runs = sum(end - start for batch in self._batches for _, start, end in batch)
-        progress.say(
-            f"{models} models and the scene as it is, {runs:,} runs each, in {turns} turns; "
-            "the scene as it is goes first",
-            always=True,
-        )
 
         def begun(cpu_s: float) -> None:
             share = sum(end - start for _, start, end in self._batches[0]) / runs
@@ -179,27 +194,46 @@ class AnswerOfStudy:
             )
 
         def after(done: int) -> list[int]:
-            left = self._remaining_models() if done == 1 else list(range(1 + models))
-            if done > 1:
-                left = [k for k in left if self._name(k) not in self._failed]
+            left = self._remaining_models()
+            self.turn_times.keep(path / _TURNS, len(self._batches))
             report = self.report()
-            progress.say(f"{self.done_text()}: {_count_text(report)}", always=done < turns)
+            going_on = done < len(self._batches)
+            progress.say(f"{self.done_text()}: {_count_text(report)}", always=going_on)
             return left
 
         try:
-            folder.open(description_text(self.study), resume=False)
+            folder.open(description_text(self.study), resume=resume)
+            before = self._take_up(path / _TURNS) if resume else 0
+            progress.say(
+                f"{models} models and the scene as it is, {runs:,} runs each, in "
+                f"{len(self._batches)} turns; the scene as it is goes first",
+                always=True,
+            )
             run_in_turns(self.study, folder, executor, workers, self._batches, self.turn_times,
-                         begun, after)  # fmt: skip
+                         begun, after, before)  # fmt: skip
         except KeyboardInterrupt:
-            if not self.turn_times.runs:
-                raise
             return True
-        except NotWritten as error:
+        except (NotWritten, OSError) as error:
             raise UsageError(f"{folder.path}: cannot be written: {error}") from error
         finally:
             executor.close()
             folder.close()
         return False
+
+    def _take_up(self, path: Path) -> int:
+        """Return how many turns an earlier attempt finished, in as many turns as it was to have."""
+        kept = self.turn_times.take_up(path)
+        if kept is None:
+            return 0
+        done, turns = kept
+        if self._repeats not in (None, turns):
+            raise UsageError(f"--repeats {self._repeats}: {path.parent} was begun in {turns} turns")
+        self._batches = turns_of(self.study, turns)
+        return done
+
+    def has_changes(self) -> bool:
+        """Return whether any model has runs that can be held against the scene as it is."""
+        return any(model for _, model in self.turn_times.runs)
 
     def _name(self, model: int) -> str:
         return str(self.study.axes[-1].labels[model])
@@ -207,7 +241,7 @@ class AnswerOfStudy:
     def _remaining_models(self) -> list[int]:
         """Return the models that gave results in the first turn, and keep why the others failed."""
         assert self._folder is not None
-        for table in self._folder.each_part():
+        for table in self._folder.each_part(before_round=1):
             errors = table["error"].to_pylist()
             if all(error is not None for error in errors):
                 self._failed[table["model"].to_pylist()[0]] = str(errors[0])

@@ -3,7 +3,13 @@
 import sys
 from pathlib import Path
 
-from dsa_des.commands.study import check_workers, report_crashes, run_into, target_of
+from dsa_des.commands.study import (
+    begun_or_empty,
+    check_workers,
+    report_crashes,
+    run_into,
+    target_of,
+)
 from dsa_des.errors import UsageError
 from dsa_des.evidence.case import ASSESSED, read_case
 from dsa_des.evidence.figures import draw_convergence, draw_sensitivity
@@ -11,7 +17,7 @@ from dsa_des.evidence.inputs import files_of_case
 from dsa_des.evidence.pack import INPUTS, MACHINE, PAGE, STUDIES, Pack
 from dsa_des.evidence.page import evidence_page
 from dsa_des.files.output_file import write_file
-from dsa_des.files.output_names import check_place, describe_write_error
+from dsa_des.files.output_names import describe_write_error
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.tables import Tables
 from dsa_des.scene.examples import find_input_file
@@ -38,10 +44,7 @@ def evidence_command(
     path = find_input_file(case, "case")
     checked = read_case(path, sets, encounters)
     location = target_of(_HOME, path.stem, out, resume)
-    if isinstance(location, Path):
-        check_place(location)
-        if location.is_dir() and any(location.iterdir()) and not resume:
-            raise UsageError(f"--out {location}: is not empty; --resume continues a pack")
+    begun_or_empty(location, resume, "a pack")
     try:
         inputs = files_of_case(checked).copies()
     except OSError as error:

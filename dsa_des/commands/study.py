@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.files.output_file import check_file, write_file
-from dsa_des.files.output_names import claim_folder, user_path
+from dsa_des.files.output_names import check_place, claim_folder, user_path
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import STUDY_JSON, StudyFolder, latest_folder
 from dsa_des.results.printing import show
@@ -77,7 +77,7 @@ def study_command(
         if measure:
             _measure(folder, silent=quiet)
     except KeyboardInterrupt:
-        _exit_stopped("interrupted", again(folder.path), 130)
+        stop_with("interrupted", again(folder.path), 130)
     report_crashes([tables], again(folder.path))
 
 
@@ -99,6 +99,14 @@ def options_as_sets(swaps: Sequence[str], seed: int | None, replicas: int | None
 def show_command(folder: str, no_figures: bool, as_json: bool) -> None:
     """Print the tables of a study's folder."""
     show_study(Path(folder), draw=not no_figures, as_json=as_json)
+
+
+def begun_or_empty(location: "Path | Callable[[], Path]", resume: bool, what: str) -> None:
+    """Raise UsageError where a folder holds something that was not to be gone on with."""
+    if isinstance(location, Path):
+        check_place(location)
+        if location.is_dir() and any(location.iterdir()) and not resume:
+            raise UsageError(f"--out {location}: is not empty; --resume continues {what}")
 
 
 def target_of(home: Path, stem: str, out: str | None, resume: bool) -> "Path | Callable[[], Path]":
@@ -137,7 +145,8 @@ def _resume_command(
     return shell_line([*words, *(["--"] if study.startswith("-") else []), study])
 
 
-def _exit_stopped(reason: str, again: str, code: int) -> NoReturn:
+def stop_with(reason: str, again: str, code: int) -> NoReturn:
+    """Say why a study stopped and how it is continued, and end."""
     say(f"stopped: {reason}; what is finished is kept, continue with", err=True)
     say(f"  {again}", err=True)
     sys.exit(code)
@@ -189,12 +198,12 @@ def run_into(
     except Stopped as stop:
         assert folder is not None
         code = 130 if str(stop) == "interrupted" else 1
-        _exit_stopped(str(stop), again if isinstance(again, str) else again(folder.path), code)
+        stop_with(str(stop), again if isinstance(again, str) else again(folder.path), code)
     except KeyboardInterrupt:
         if folder is None or not (folder.path / STUDY_JSON).exists():
             sys.exit(130)
         command = again if isinstance(again, str) else again(folder.path)
-        _exit_stopped("interrupted", command, 130)
+        stop_with("interrupted", command, 130)
     finally:
         executor.close()
         if folder is not None:

@@ -139,17 +139,17 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
             drawn.append((axes, _draw_panel(axes, rungs)))
         tight(figure)
         for axes, labels in drawn:  # where points are is known only now
-            _put_labels(axes, labels)
+            put_labels(axes, labels)
 
 
 #: So many letters of the figure's title stand above one panel.
 _LETTERS = 46
 
 #: What is written, at which point, how far its error bar reaches, in which colour.
-_Label = tuple[str, tuple[float, float], float, str]
+Label = tuple[str, tuple[float, float], float, str]
 
 
-def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[_Label]:
+def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[Label]:
     """Draw a ladder's points and front, and return their labels."""
     first, quantity = rungs[0], rungs[0].ladder.quantities[0]
     others = [cost.error.p95 for cost in rungs if cost.rung != first.reference]
@@ -158,7 +158,7 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[_Label]:
     # true scale they would press all others together, and a log axis has no zero.
     floor = 0.1 * min(known) if known else 1e-3
     points: list[tuple[tuple[float, float], bool]] = []
-    labels: list[_Label] = []
+    labels: list[Label] = []
     for cost in sorted(rungs, key=lambda c: c.cpu_us_per_target_scan):
         error, label = cost.error.p95, cost.rung + (" (scene)" if cost.in_scene else "")
         on_floor = not error > floor
@@ -195,7 +195,7 @@ def _tiny(error: float) -> str:
     return f"{error:.0e}" if error else "0"
 
 
-def _put_labels(axes: Any, labels: Sequence[_Label]) -> None:
+def put_labels(axes: Any, labels: Sequence[Label]) -> None:
     """Write each label beside its point, moved until it covers no point and no other label."""
     high, wide, gap, mark = 12.0, 6.4, 5.0, 5.0  # a line, a letter, a gap, half a point; pixels
     places = []

@@ -158,7 +158,8 @@ def _show_ratios(console: Any, tables: Tables, lines: Sequence[Line]) -> None:
                 group=len(tables.rows.axes))  # fmt: skip
     if tables.record.geometry:
         for line in lines[:_MOST_SHOWN]:
-            console.print(gain_text(line))
+            if line.ratio is not None and line.ratio.encounters:
+                console.print(gain_text(line))
 
 
 def gain_text(line: Line) -> str:
@@ -166,10 +167,14 @@ def gain_text(line: Line) -> str:
     ratio = line.ratio
     assert ratio is not None
     at = "".join(f"{short(value)}: " for value in line.at)
+    if ratio.flown == ratio.encounters:
+        return f"{at}{line.result.name}: all {ratio.flown:,} runs were flown: nothing is gained"
     said = f"{at}{line.result.name}: {ratio.flown:,} of {ratio.encounters:,} runs were flown"
+    if not ratio.reason and not ratio.mitigated_events:
+        return f"{said}; the event came in none of them, so what is gained is not known"
     if ratio.reason or not ratio.gain > 0.0:
         return said
-    if ratio.gain <= 1.0:
+    if ratio.gain < 1.05:
         return f"{said}; as wide an interval costs no more with all of them: nothing is gained"
     return f"{said}; as wide an interval costs {ratio.gain:.2g} times as much with all of them"
 

@@ -261,8 +261,9 @@ class Node:
         scan = self._scan_at.get(tick, -1)
         idle = None
         if self.pulse is not None and scan < 0:
-            came = any(len(wire.next_arrivals(tick + 1)) for wire in self._trigger_wires)
-            idle = np.array([not came])
+            # What came while the block was out does not come now.
+            new = [wire.next_arrivals(tick + 1).tick for wire in self._trigger_wires]
+            idle = np.array([not any((arrival == tick).any() for arrival in new)])
         waiting = idle is not None and bool(idle[0])
         if not waiting and self.processor is not None and self.processor.refuses(self.name):
             for wire in self._trigger_wires:

@@ -267,10 +267,8 @@ def _two_writers(
             message = f"{', '.join(twice)} is wired to {target}.{input_name} more than once"
             scene.report(("wires",), message)
         elif len(result) > 1 and not classes[target].inputs[input_name].many:
-            message = (
-                f"{target}.{input_name} has {len(result)} writers: {', '.join(sorted(ends))}: it "
-                "takes from one, as from one place; give each platform a block of its own"
-            )
+            from_all = ", ".join(sorted(ends))
+            message = f"{target}.{input_name} has {len(result)} writers, and takes one: {from_all}"
             scene.report(("wires",), message)
 
 

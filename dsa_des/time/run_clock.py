@@ -54,6 +54,7 @@ class RunClock:
         self._clocks = [clock(number, spec) for number, spec in each]
         self.period = min(clock.period for clock in self._clocks)
         self._offsets = np.array([spec.offset_s * ticks_per_s for spec in specs], dtype=np.int64)
+        self._alike_at_once = self._alike and bool((self._offsets == self._offsets[0]).all())
         self._going = range(0)  # those whose scans are kept in `_last` and `_read`
         self._last: tuple[int, int, Scans] = (0, -1, (_NONE, RunTicks.empty()))
         self._read = _NOTHING
@@ -75,7 +76,7 @@ class RunClock:
 
     def none_before(self, tick: int) -> int:
         """Return a tick, not before this one, before which no run has a scan from this one on."""
-        if self._runs.count > 1:
+        if self._runs.count > 1 and not self._alike_at_once:
             return tick
         # Who asks goes on in time, and what was found holds up to there.
         if not self._none[0] <= tick <= self._none[1]:
@@ -120,6 +121,8 @@ class RunClock:
         offsets = self._offsets[runs]
         earliest, latest = int(offsets.min()), int(offsets.max())
         scans, ticks = clock.between(start + clock.offset - latest, end + clock.offset - earliest)
+        if not len(ticks):
+            return _NONE, RunTicks.empty()
         later = offsets - clock.offset
         first, last = np.searchsorted(ticks, [start - later, end - later])
         counts = last - first

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import shlex
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -12,6 +13,7 @@ from scipy import stats
 
 from dsa_des.cli import main
 from dsa_des.commands import cost_answer
+from dsa_des.record.drawing import kept_figures
 
 STUDY = """
 title = "A head-on intruder, seen by a radar"
@@ -45,14 +47,15 @@ def study(tmp_path_factory):
 @pytest.fixture(scope="module")
 def made(study, tmp_path_factory):
     out = tmp_path_factory.mktemp("cost") / "out"
-    done = call(
-        "cost", study, "--answer", RANGE, "--answer", "declared.radar", "--block", "radar",
-        "--vary", "blocks.radar.scan_rate_hz=[2, 5]",
-        "--vary", "swap.transform=geometry.flat_earth", "--vary", "swap.radar=radar.threshold",
-        "--budget", "400m", "--repeats", "2", "--workers", "1", "--out", out,
-    )  # fmt: skip
+    with kept_figures() as figures:
+        done = call(
+            "cost", study, "--answer", RANGE, "--answer", "declared.radar", "--block", "radar",
+            "--vary", "blocks.radar.scan_rate_hz=[2, 5]",
+            "--vary", "swap.transform=geometry.flat_earth", "--vary", "swap.radar=radar.threshold",
+            "--budget", "400m", "--repeats", "2", "--workers", "1", "--out", out,
+        )  # fmt: skip
     assert done.exit_code == 0, done.output
-    return done, out, pq.read_table(out / "answer.parquet").to_pylist()
+    return done, out, pq.read_table(out / "answer.parquet").to_pylist(), figures["answer"]
 
 
 def values_of(folder, name=RANGE):
@@ -112,9 +115,10 @@ def test_changes_agree_with_two_independent_long_runs(study, made, tmp_path):
 
 
 def test_it_is_printed_what_the_files_hold(made):
-    done, out, rows = made
+    done, out, rows, _ = made
     assert sorted(path.name for path in out.iterdir()) == [
-        "answer.csv", "answer.parquet", "run.json", "study"]  # fmt: skip
+        "answer.csv", "answer.parquet", "answer.png", "run.json", "study", "turns.json",
+    ]  # fmt: skip
     told = done.stdout
     assert f"{RANGE}, m: each model in place of the scene's own" in told
     assert "The scene as it is: radar detection: exact, radar.scan_rate_hz = 5." in told
@@ -131,6 +135,23 @@ def test_it_is_printed_what_the_files_hold(made):
     assert [row["change"] for row in again] == [
         "" if row["change"] is None else repr(row["change"]) for row in rows]  # fmt: skip
     assert all(row["cpu_of_own"] > 0.0 for row in rows)
+
+
+def test_the_figure_has_every_change_with_its_interval_against_its_cost(made):
+    """Points and bars are those of the table, the limit is a band, and who leaves it is named."""
+    rows, figure = made[2], made[3]
+    for axes, name in zip(figure.axes, (RANGE, "declared.radar"), strict=True):
+        assert axes.get_title() == name
+        known = [row for row in rows if row["result"] == name and row["high"] is not None]
+        mine = {row["model"]: row for row in known}
+        bars = [bar.get_segments() for bar in axes.collections]
+        spans = {(x0, y0, y1) for some in bars for (x0, y0), (x1, y1) in some if x0 == x1}
+        assert spans == {(row["cpu_of_own"], row["low"], row["high"]) for row in mine.values()}
+        named = {text.get_text() for text in axes.texts} - {"as it is", ""}
+        assert named <= mine.keys()
+        assert named >= {n for n, row in mine.items() if row["front"] or row["verdict"] == "beyond"}
+    limit = figure.axes[0].patches[0].get_extents().transformed(figure.axes[0].transData.inverted())
+    assert (limit.y0, limit.y1) == pytest.approx((-400.0, 400.0))
 
 
 def test_what_is_foreseen_stands_first_and_each_turn_is_told(made):
@@ -176,7 +197,7 @@ def test_any_number_of_workers_gives_the_same(study, tmp_path):
     assert answers[:2] == answers[2:]
 
 
-def test_ctrl_c_keeps_the_turns_that_are_finished(study, tmp_path, monkeypatch):
+def test_ctrl_c_keeps_the_turns_that_are_finished(study, made, tmp_path, monkeypatch):
     told = cost_answer.AnswerOfStudy.done_text
 
     def interrupted(self):
@@ -190,9 +211,28 @@ def test_ctrl_c_keeps_the_turns_that_are_finished(study, tmp_path, monkeypatch):
     done = call("cost", study, "--answer", RANGE, "--block", "radar", "--repeats", "4",
                 "--workers", "1", "--out", out)  # fmt: skip
     assert done.exit_code == 130, done.output
-    assert "stopped: interrupted; 2 of 4 turns are kept" in done.stderr
+    assert "stopped: interrupted after 2 of 4 turns; what is finished is kept" in done.stderr
     rows = pq.read_table(out / "answer.parquet").to_pylist()
     assert {row["runs"] for row in rows} == {6}
+    kept = {path: path.stat().st_mtime_ns for path in (out / "study" / "parts").iterdir()
+            if path.name < "part-002"}  # fmt: skip
+    again = shlex.split(done.stderr.splitlines()[-1])
+    assert again[:3] == ["dsa-des", "cost", "--resume"] and again[-2:] == ["--", str(study)]
+    refused = CliRunner().invoke(main, [*again[1:-2], "--repeats", "3", *again[-2:]])
+    assert refused.exit_code == 2 and "was begun in 4 turns" in refused.stderr
+    refused = CliRunner().invoke(main, ["cost", *again[3:]])
+    assert refused.exit_code == 2 and "is not empty; --resume continues" in refused.stderr
+    turns = (out / "turns.json").read_bytes()
+    (out / "turns.json").write_bytes(turns[:-9])
+    refused = CliRunner().invoke(main, again[1:])
+    assert refused.exit_code == 2 and "turns.json: is damaged" in refused.stderr
+    (out / "turns.json").write_bytes(turns)
+    done = call(*again[1:-2], "--no-figures", *again[-2:])
+    assert done.exit_code == 0, done.output
+    assert kept == {path: path.stat().st_mtime_ns for path in kept}
+    for row in pq.read_table(out / "answer.parquet").to_pylist():
+        (whole,) = [r for r in made[2] if (r["model"], r["result"]) == (row["model"], RANGE)]
+        assert (row["runs"], row["change"]) == (12, whole["change"])
 
 
 def test_a_model_whose_runs_all_fail_is_named_with_its_reason(study, tmp_path):
@@ -244,7 +284,7 @@ def test_what_cannot_be_asked(study, tmp_path, words, message):
 
 
 def test_options_of_answers_want_an_answer(tmp_path):
-    for words in (["--vary", "seed=[1, 2]"], ["--workers", "2"]):
+    for words in (["--vary", "seed=[1, 2]"], ["--workers", "2"], ["--resume"]):
         done = CliRunner().invoke(main, ["cost", "first_light", *words])
         assert done.exit_code == 2
         assert f"{' '.join(words)}: goes with --answer RESULT of a study" in done.stderr

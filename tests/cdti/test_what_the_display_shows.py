@@ -186,3 +186,20 @@ def test_the_camera_s_picture_is_of_the_chosen_contact(shown):
         assert found["target"] == contact[name]
         assert found["age"] == pytest.approx(DURATION_S - rows[-1]["time_s"], abs=0.006)
         assert found["pixels"] == pytest.approx(rows[-1]["pixels"], abs=0.06)
+
+
+def test_a_sensor_that_falls_silent_is_said_to_be_out():
+    off = {"from_s": 3, "to_s": 6, "set": {"blocks.radar.enabled": False}}
+    fast, slow = ({**SEES_ALL, "scan_rate_hz": rate_hz} for rate_hz in (10, 0.25))
+    sensors = {"radar": RADAR, "slow": slow, "fast": fast, "aside": {**RADAR, "enabled": False}}
+    out = {}
+
+    def look(scope, time_s):
+        out[round(time_s, 3)] = scope.picture(time_s)["out"]
+
+    scene = chain(sensors, targets=TARGETS.values(), duration_s=9, changes=[off])
+    displayed(scene, look, window=1)
+    said = sorted(time_s for time_s, names in out.items() if names == ["radar"])
+    # Its last scan was at 2.5 s: two and a half scans of half a second each are over at 3.75 s.
+    assert (said[0], said[-1], len(said)) == (3.8, 5.9, 22)
+    assert not any(names for time_s, names in out.items() if time_s not in said)

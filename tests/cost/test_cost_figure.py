@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.costs.climb import Comparison, RungCost
-from dsa_des.costs.output import _cells, _put_labels, draw_costs
+from dsa_des.costs.output import _cells, draw_costs, put_labels
 from dsa_des.costs.replay import Spread
 from dsa_des.record.drawing import keep_figures
 
@@ -24,7 +24,7 @@ def test_labels_cover_neither_each_other_nor_a_point():
         "exact (scene)": (0.36, 20.0), "sampled_table": (0.62, 0.36), "mesh": (700.0, 0.6),
         "union: 5e-15 m²": (0.62, 0.03), "window": (0.62, 0.37), "far right of all": (8e3, 1.0),
     }  # fmt: skip
-    _put_labels(axes, [(name, at, 0.1 * at[0], "black") for name, at in points.items()])
+    put_labels(axes, [(name, at, 0.1 * at[0], "black") for name, at in points.items()])
     boxes = {text.get_text(): text.get_window_extent(renderer) for text in axes.texts}
     assert boxes.keys() == points.keys()
     for one, other in combinations(boxes, 2):

@@ -125,7 +125,8 @@ def test_flights_made_together_lie_in_memory_once():
                 mine, other = getattr(one, name), getattr(alone[number], name)
                 assert mine.tobytes() == other.tobytes()
             assert one.max_speed_mps == alone[number].max_speed_mps
-    mixed = SampledFleet([made[1], alone[0]])
+    mixed = SampledFleet([made[1], alone[0], made[1]])
+    assert len(mixed._table[0]) == 2 * len(times)  # who flies in several runs is there once
     assert_each_same(mixed, -1, 61)
     assert np.shares_memory(alone[0].coefficients, mixed._table[0])
     assert_each_same(own, -1, 61)

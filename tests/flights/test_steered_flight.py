@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from components.flights.many_flights import SteeredFlight
+from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.steering import Manoeuvre
-from components.metrics.flown_flights import flown_as_steered
+from components.metrics.flown_flights import Told, flown_as_steered
 
 STRAIGHT = ScriptedTrajectory(
     "own", lat_deg=52.0, lon_deg=4.0, alt_m=1000.0, heading_deg=90.0, speed_mps=60.0
@@ -162,11 +162,18 @@ def test_a_speed_does_not_become_negative():
     assert state.lon_deg[0] == state.lon_deg[1]
 
 
+def as_told(commands):
+    times_s, manoeuvres = map(np.array, zip(*commands, strict=True))
+    return Told(times_s, times_s, np.full(len(times_s), -1), manoeuvres)
+
+
 def test_who_is_told_more_often_than_others_flies_as_if_alone():
     left, right = Manoeuvre(-0.5, 0.05), Manoeuvre(0.4, 0.05)
     told = [[(10.0, left)], [(5.0, right), (30.0, left)], [(8.0, left), (9.0, right), (40.0, left)]]
     times = np.linspace(0.0, 80.0, 33)
-    for one, found in zip(told, flown_as_steered([STRAIGHT] * 3, told), strict=True):
+    for one, found in zip(
+        told, flown_as_steered([STRAIGHT] * 3, list(map(as_told, told))), strict=True
+    ):
         alone = SteeredFlight(STRAIGHT)
         for time_s, manoeuvre in one:
             alone = alone.add_manoeuvre(time_s, manoeuvre)
@@ -264,6 +271,40 @@ def test_a_turn_that_a_climb_meets_ends_where_it_would_have_ended():
     ends = np.array([30.0])
     assert alone.at(ends).yaw_rad == pytest.approx(only.at(ends).yaw_rad, abs=1e-4)
     times = np.linspace(0.0, 80.0, 33)
-    for found in flown_as_steered([STRAIGHT] * 2, [commands, commands]):
+    for found in flown_as_steered([STRAIGHT] * 2, [as_told(commands)] * 2):
         for got, expected in zip(found.at(times).arrays(), alone.at(times).arrays(), strict=True):
             assert np.array_equal(got, expected)
+
+
+def test_fleets_that_grew_out_of_one_each_keep_their_own_manoeuvres():
+    """A run that goes back steers anew from a fleet that was steered on already."""
+    runs, times = np.arange(3), np.arange(0.0, 40.0, 0.5)
+    fleet = SteeredFleet(fleet_of([STRAIGHT] * 3))
+    first = fleet
+    for at_s in (5.0, 7.0, 9.0):
+        first = first.steered(runs, np.full(3, at_s), [Manoeuvre(0.1 * k, 0.05) for k in (1, 2, 3)])
+
+    def ways(fleet):
+        return np.array([fleet[run].at(times).lat_deg for run in runs.tolist()])
+
+    before = ways(first)
+    both = [
+        first.steered(np.array(who), np.full(len(who), at_s), [Manoeuvre(turn, 0.05)] * len(who))
+        for who, at_s, turn in (([0, 2], 20.0, 0.5), ([0, 1], 15.0, -0.7))
+    ]
+    assert np.array_equal(ways(first), before)
+    for fleet, (who, at_s, turn) in zip(
+        both, (([0, 2], 20.0, 0.5), ([0, 1], 15.0, -0.7)), strict=True
+    ):
+        for run in runs.tolist():
+            alone = SteeredFlight(STRAIGHT)
+            for before_s in (5.0, 7.0, 9.0):
+                alone = alone.steered(before_s, Manoeuvre(0.1 * (run + 1), 0.05))
+            if run in who:
+                alone = alone.steered(at_s, Manoeuvre(turn, 0.05))
+            assert np.array_equal(ways(fleet)[run], alone.at(times).lat_deg)
+            # As many as count: by the first ones only, or by none.
+            for known in (0, 3):
+                got = fleet.each(np.full(len(times), run), times, np.full(len(times), known))
+                expected = before[run] if known else STRAIGHT.at(times).lat_deg
+                assert np.array_equal(got.lat_deg, expected)

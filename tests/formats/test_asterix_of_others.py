@@ -185,7 +185,12 @@ def test_a_radar_that_says_no_place_is_put_where_the_scene_says(tmp_path):
     assert {round(x, 6) for x in put.scans["own_lat_deg"].to_pylist()} == {lat}
 
 
-@covers("place", of=("traffic.file", "traffic.csv", "traffic.asterix"))
+@covers(
+    "place.lat_deg",
+    "place.lon_deg",
+    "place.alt_m",
+    of=("traffic.file", "traffic.csv", "traffic.asterix"),
+)
 def test_plots_that_say_whose_they_are_are_flown(tmp_path):
     """By address, else by code; those of a second radar, and primary ones, are left out."""
     path = tmp_path / "p.ast"

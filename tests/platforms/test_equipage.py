@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 import dsa_des
 from components.examples import folder as examples
-from docs.make.equipage import rows
+from docs.make.platforms.equipage import rows
 from dsa_des.cli import main
 from dsa_des.files.toml_files import to_toml
 
@@ -30,7 +30,7 @@ def test_all_meet_the_same_encounters_and_whoever_has_nothing_flies_on(whole):
     _, runs = whole
     nominal = runs.loc["none"][["nmac_nominal", "well_clear_lost_nominal"]]
     assert nominal["well_clear_lost_nominal"].sum() > 10
-    for who in ("none", "ownship", "intruder", "both"):
+    for who in ("none", "ownship", "intruder", "both", "both, coordinated"):
         assert runs.loc[who][nominal.columns].equals(nominal)
     for event in ("nmac", "well_clear_lost"):
         none = runs.loc["none"]
@@ -63,9 +63,16 @@ def test_whose_radar_is_off_is_as_one_without_a_chain(whole, tmp_path):
 
 def test_the_page_s_table_counts_what_both_bring_about(whole):
     folder, runs = whole
-    lines = rows(folder)
+    lines = rows([pd.read_parquet(folder / "parts")])
     lost = {who: runs.loc[who].well_clear_lost_mitigated for who in ("ownship", "intruder", "both")}
     new = [b and not (one or other) for one, other, b in zip(*lost.values(), strict=True)]
     said = f"both: {sum(map(bool, new))} of {int(lost['both'].sum())} losses of well clear"
-    assert lines[-1].startswith(said)
-    assert lines[3].startswith("| ownship |") and f" | {int(lost['ownship'].sum())} | " in lines[3]
+    assert any(line.startswith(said) for line in lines)
+    assert lines[5].startswith("| ownship |") and f" | {int(lost['ownship'].sum())} | " in lines[5]
+    # The ratios and their intervals are those of the study.
+    ratios = pd.read_parquet(folder / "ratios.parquet").set_index(["equipage", "result"])
+    one = ratios.loc["ownship", "well_clear_lost_risk_ratio"]
+    assert f"{one.ratio:.3f} ({one.gamma_low:.3f} to {one.gamma_high:.3f})" in lines[5]
+    change = runs.loc["both"].well_clear_lost_mitigated - lost["intruder"]
+    counts = f"{int((change > 0).sum())} more and {int((change < 0).sum())} fewer losses"
+    assert any(line.startswith(f"both beside intruder: {counts}") for line in lines)

@@ -71,6 +71,20 @@ def test_events_of_each_are_nominal_without_anybody_s_manoeuvres(scene, apart):
         assert counted["manoeuvres"] == told.count(mine) > 0
 
 
+def test_events_between_any_two_are_those_of_the_nearest_two(scene, apart):
+    """b and c are nearer to each other than either is to the ownship."""
+    between = {pair: of.min() for pair, of in apart.items() if pair[0] != pair[1]}
+    nearest, own = between["b", "c"], min(between["ownship", one] for one in "bc")
+    assert nearest == min(between.values()) < own - 20.0
+    for more_m, lost in ((5.0, 1.0), (-5.0, 0.0)):
+        size = {"horizontal_m": nearest + more_m, "vertical_m": 400.0}
+        found = [measured(scene, {"metric": "mitigated", "platform": platform, **size})
+                 for platform in ("*", "ownship")]  # fmt: skip
+        assert [one["well_clear_lost_mitigated"] for one in found] == [lost, 0.0]
+    with pytest.raises(dsa_des.SceneError, match="there is no '\\*'"):
+        measured(scene, {"metric": "manoeuvres", "platform": "*"})
+
+
 @covers("platform", of=("[metric risk_ratio]", "[metric severity]", "[metric well_clear]",
                         "[metric alert_times]"))  # fmt: skip
 def test_a_pair_is_as_far_apart_for_the_one_as_for_the_other(scene):

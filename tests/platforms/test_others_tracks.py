@@ -1,9 +1,11 @@
 """Tracks that one platform sends to another: their frame, their sureness, and whose they are."""
 
 import numpy as np
+import pandas as pd
 import pyarrow.compute as pc
 import pymap3d
 import pytest
+from click.testing import CliRunner
 from covering import covers
 from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 
@@ -12,8 +14,10 @@ from components.alerting.others_tracks import OthersTracks
 from components.estimation.motion import ConstantVelocity
 from components.messages.columns import ORIGIN
 from components.messages.state_tracks import COVARIANCE
+from docs.make.platforms.link_latency import rows
 from dsa_des import SceneError
 from dsa_des.arrays.keyed_table import KeyedTable
+from dsa_des.cli import main
 from dsa_des.running.simulation import Simulation
 
 RADAR = "configs/platforms/ground_radar.toml"
@@ -264,7 +268,7 @@ def misspelt(tables):
         (BOTH, camera, "blocks.tracks: is carried by 'ownship', as eo_tracker feeds it, and "
          "tracker on 'site' feeds it too: which of them it is on, its table must say"),
         (RADAR, forgotten, "avoidance is on 'site', which stands and is not steered"),
-        (BOTH, two_gates, "takes from one, as from one place"),
+        (BOTH, two_gates, "has 2 writers, and takes one: gate.targets, gate_air.targets"),
         (BOTH, detections, "a block looks from one place"),
         (RADAR, misspelt, "there is no such aircraft or place; did you mean 'site'?"),
     ],
@@ -276,3 +280,18 @@ def test_the_likeliest_mistakes_are_said(path, mistake, said):
         Simulation(load(tables))
     assert said in str(refused.value)
     assert len(refused.value.problems) == 1
+
+
+def test_an_alert_of_who_turns_in_is_later_by_the_link_s_latency(tmp_path):
+    """At 55 m/s the two come 110 m nearer in 2 s; to a steady flight latency is nothing."""
+    call = ["study", "link_latency", "--set", "replicas=8", "--workers", "1", "--quiet"]
+    done = CliRunner().invoke(main, [*call, "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    cells = [
+        line.strip("| ").split(" | ")
+        for line in rows([pd.read_parquet(tmp_path / "out" / "parts")])[2:]
+    ]
+    nearer = {(float(c[0]), c[1]): [float(c[k].split()[0]) for k in (3, 5)] for c in cells}
+    assert nearer[0.0, "0 %"] == [0.0, 0.0]
+    assert nearer[2.0, "0 %"] == [pytest.approx(0.0, abs=110.0), pytest.approx(109.0, abs=15.0)]
+    assert nearer[1.0, "0 %"][1] == pytest.approx(nearer[2.0, "0 %"][1] / 2.0, abs=10.0)

@@ -129,7 +129,51 @@ def outages(tables: dict[str, Any], dice: Dice) -> list[dict[str, Any]]:
             "mean_between_s": dice.pick(0.2, 0.5) * ends,
             "mean_repair_s": dice.pick(0.05, 0.3) * ends, "restart_s": dice.pick(0, 0.1),
         })  # fmt: skip
+        kinds = [tables["blocks"][name]["type"].partition(".")[0] for name in blocks]
+        if set(kinds) <= {"radar", "optical"} and dice.chance(0.6):
+            if dice.chance(0.6, "frozen outage"):
+                found[-1]["mode"] = "frozen"
+            else:
+                dice.features.add("stuck bit")
+                stuck = dice.pick({"azimuth_deg": 11.25}, {"range_m": 256, "azimuth_deg": 90})
+                found[-1] |= {"mode": "stuck_bit", "stuck": stuck}
     return found
+
+
+def pulses(tables: dict[str, Any], dice: Dice) -> None:
+    """Let radars with a link budget have pulses, whose echoes fold, and ground that mirrors."""
+    for table in tables["blocks"].values():
+        if table["type"] not in ("radar.threshold", "radar.swerling") or "prf_hz" in table:
+            continue
+        dice.features.add("folded ranges")
+        table |= {"prf_hz": dice.pick(9e3, 4e4, 2e5), "range_folds": True}
+        table.setdefault("range_km", dice.pick(5, 15))
+        if dice.chance(0.5, "pulse width"):
+            table["pulse_width_s"] = dice.pick(3e-7, 2e-6)
+        if dice.chance(0.4, "several PRFs"):
+            table["other_prfs_hz"] = dice.pick([1e4, 1.13e4], [1e4, 1.13e4, 1.37e4])
+            table.setdefault("range_resolution_m", 30)
+            table["prfs_needed"] = dice.pick(1, 2, 3)
+    if "height_m" in tables.get("terrain", {}):
+        dice.maybe(tables["terrain"], "roughness_m", 0.5, 0, 0.2)
+        dice.maybe(tables["terrain"], "facet_slope_deg", 0.5, 5)
+
+
+def weather_cells(tables: dict[str, Any], dice: Dice) -> None:
+    """Let showers and fog banks move near the first ownship, or far away."""
+    owns = [t["ownship"] for t in tables["blocks"].values() if isinstance(t.get("ownship"), dict)]
+    if not (owns and "lat_deg" in owns[0]):
+        return
+    dice.features.add("weather cells")
+    tables["weather"] = {**tables.get("weather", {}), "cells": [
+        {
+            "lat_deg": max(-89.0, min(89.0, owns[0]["lat_deg"] + dice.pick(-0.02, 0.0, 0.03, 5))),
+            "lon_deg": owns[0]["lon_deg"], "radius_km": dice.pick(0.5, 3),
+            **dice.pick({"rain_rate_mm_h": 20}, {"fog_water_g_m3": 0.2}),
+            "speed_mps": dice.pick(0, 30), "towards_deg": dice.pick(0, 100),
+        }
+        for _ in range(dice.pick(1, 2))
+    ]}  # fmt: skip
 
 
 def replicas(tables: dict[str, Any], dice: Dice) -> list[Replica]:

@@ -13,7 +13,7 @@ from typing import Any
 import random_blocks
 import random_flights
 from dice import Dice
-from random_changes import outages, timed
+from random_changes import outages, pulses, timed, weather_cells
 from random_platforms import equip
 
 from dsa_des.errors import SceneError
@@ -109,6 +109,12 @@ def legal_case(seed: int, folder: Path, changing: float = 0.2, equipped: float =
             refused += [problem.message for problem in error.problems]
             continue
         apart = Dice(11 * seed + 5 + attempt)  # scenes in which nothing changes stay what they were
+        newer = Dice(17 * seed + 7 + attempt)
+        if newer.chance(changing / 2, "pulses that fold"):
+            pulses(case.tables, newer)
+        if newer.chance(changing / 2, "weather in places"):
+            weather_cells(case.tables, newer)
+        case.features |= newer.features
         if apart.chance(changing, "changes") and (changes := timed(case.tables, apart)):
             case.tables["changes"] = changes
             case.features |= apart.features

@@ -226,15 +226,21 @@ def test_events_of_two_conditions_have_a_weighted_ratio() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gain", "reason", "more"),
+    ("gain", "reason", "events", "more"),
     [
-        (2.345, "", "; as wide an interval costs 2.3 times as much with all of them"),
-        (1.0, "", "; as wide an interval costs no more with all of them: nothing is gained"),
-        (0.4, "", "; as wide an interval costs no more with all of them: nothing is gained"),
-        (0.0, "", ""), (math.nan, "", ""), (2.0, "too few", ""),
+        (2.345, "", 9, "; as wide an interval costs 2.3 times as much with all of them"),
+        (1.0, "", 9, "; as wide an interval costs no more with all of them: nothing is gained"),
+        (1.04, "", 9, "; as wide an interval costs no more with all of them: nothing is gained"),
+        (0.4, "", 9, "; as wide an interval costs no more with all of them: nothing is gained"),
+        (0.0, "", 9, ""), (math.nan, "", 9, ""), (2.0, "too few", 9, ""), (2.0, "too few", 0, ""),
+        (math.nan, "", 0, "; the event came in none of them, so what is gained is not known"),
     ],
 )  # fmt: skip
-def test_what_a_choice_of_runs_gained_is_said_in_a_sentence(gain, reason, more) -> None:
-    ratio = SimpleNamespace(flown=1200, encounters=34_000, gain=gain, reason=reason)
+def test_what_a_choice_of_runs_gained_is_said_in_a_sentence(gain, reason, events, more) -> None:
+    ratio = SimpleNamespace(
+        flown=1200, encounters=34_000, gain=gain, reason=reason, mitigated_events=events
+    )
     line = SimpleNamespace(ratio=ratio, at=[2.5, "ekf"], result=SimpleNamespace(name="risk"))
     assert gain_text(line) == f"2.5: ekf: risk: 1,200 of 34,000 runs were flown{more}"
+    ratio.flown = 34_000
+    assert gain_text(line) == "2.5: ekf: risk: all 34,000 runs were flown: nothing is gained"

@@ -135,7 +135,7 @@ def test_a_block(lab, block, text):
         (
             {**CHAIN, "d": PULSE},
             [*WIRES, '"d -> c"'],
-            "wires: c.in has 2 writers: b.out, d.out",
+            "wires: c.in has 2 writers, and takes one: b.out, d.out",
         ),
         (
             {"a": PULSE, "b": "Join"},

@@ -6,9 +6,10 @@ import pytest
 from click.testing import CliRunner
 
 import dsa_des
-from docs.make.outages.__main__ import moment_rows, risk_rows
+from docs.make.outages.__main__ import link_rows, moment_rows, risk_rows
 from dsa_des.cli import main
 from dsa_des.files.toml_files import to_toml
+from dsa_des.replicas.times_out import times_out_s
 
 
 def runs_of(folder, *words, replicas):
@@ -70,3 +71,26 @@ def test_an_alert_loses_most_if_the_radar_fails_just_before_it(tmp_path):
     lost_s = {float(cell[0]): float(cell[2]) for cell in cells}
     assert max(lost_s, key=lost_s.__getitem__) == 20
     assert lost_s[20] == pytest.approx(first_s[20] - fine_s, abs=0.06)
+
+
+def test_a_link_that_fails_leaves_more_of_the_risk_and_fine_runs_as_they_were(tmp_path):
+    runs = runs_of(tmp_path, "link_outage_risk", replicas=12)
+    by = runs.set_index(["outage", "replica"])
+    never = by.loc["never"]
+    flown = [name for name in runs if name.endswith(("_nominal", "_mitigated"))]
+    scene = dsa_des.load_scene("link_fails")
+    same = changed = 0
+    for outage, mean_s, repair_s in (("120 s, 60 s", 120, 60), ("30 s, 60 s", 30, 60)):
+        mine = by.loc[outage]
+        assert (mine.seed == never.seed).all()
+        one = dsa_des.load_scene("link_fails", sets=[
+            f"outages[0].mean_between_s={mean_s}", f"outages[0].mean_repair_s={repair_s}"
+        ])  # fmt: skip
+        out = times_out_s(one, mine.seed.tolist(), np.full(len(mine), 180.0))["pilot"]
+        for number, spans in enumerate(out):
+            alike = mine[flown].iloc[number].equals(never[flown].iloc[number])
+            assert len(spans) or alike
+            same += not len(spans)
+            changed += not alike
+    assert same and changed and [o.key for o in scene.outages] == ["link"]
+    assert link_rows(tmp_path)[2].startswith("| never | ")

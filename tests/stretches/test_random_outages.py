@@ -76,6 +76,16 @@ def test_what_comes_over_the_wires_of_a_block_that_is_out_is_lost():
     assert tables["fused"].equals(never["fused"].filter(up))
 
 
+def test_what_came_while_a_tracker_was_out_is_lost_scan_by_scan_too():
+    """It wakes by itself twice a second: what came before, while it was out, does not come then."""
+    late = ["traffic -> transform -> gate", "gate -> radar", "fusion -> tracker",
+            "traffic -> alerting.states", "tracker -> alerting.estimates",
+            {"from": "radar", "to": "fusion", "delay_s": 0.3}]  # fmt: skip
+    failing = scene(tracks=True, wires=late, outages=[outage("tracker")])
+    whole = same_in_any_window(failing, windows=(1,))
+    assert whole["state_tracks"].num_rows
+
+
 @covers("restart_s", of=("[outages]",))
 def test_a_restart_takes_its_time():
     def missing(**keys):
@@ -141,6 +151,10 @@ def test_a_frozen_radar_sends_its_last_detections_again_and_again():
         assert mine.get(tick, []) == want
     false = got["detections"].filter(got["detections"]["target"].is_null())
     assert false["true_range_m"].null_count == len(false) > 0
+    # One that is frozen before its first scan has no values of its own, and sends none of others.
+    early = scene(duration_s=12, outages=[outage("radar", mode="frozen", mean_between_s=2)])
+    loud = {"blocks.radar.offset_s": 3, "blocks.radar.power_w": 8000}
+    same_as_alone(replicas_of(early, *[loud] * 4), window=30)
 
 
 @covers("stuck", of=("[outages]",))

@@ -48,6 +48,22 @@ def test_what_is_not_measured_cannot_be_stated(kind):
         assert f"blocks.sensor.{key}" in {problem.key for problem in caught.value.problems}
 
 
+@covers("leaves_out", of=KINDS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_who_is_served_is_left_out_by_its_address(kind):
+    """A transponder of Mode C alone has none: its replies stay."""
+    name, other = sorted(BOTH)
+    assert seen(kind, leaves_out=[name]) == {other} and seen(kind, leaves_out=[*BOTH]) == set()
+    with pytest.raises(dsa_des.SceneError, match=f"leaves_out: there is no 'x{name}'; did you"):
+        Simulation(dsa_des.load_scene(scene(kind, leaves_out=[f"x{name}"])))
+    if kind == "surveillance.active":
+        tables = scene(kind, leaves_out=[name])
+        for one in tables["blocks"]["traffic"]["intruders"]:
+            one |= {"mode_s": False, "mode_c": True}
+            del one["ads_b"]
+        assert {row["target"] for row in rows(run(tables), scan=2)} == BOTH
+
+
 @covers("enabled", "range_km", "azimuth_deg", "elevation_deg", of=KINDS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_reach(kind):

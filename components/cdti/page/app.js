@@ -106,6 +106,7 @@ const App = (() => {
       Scope.draw(frame, scene, state.chosen, flown(turn), drawn);
       Tapes.draw(frame.own, frame.bands, flown(climb), drawn);
       Panel.flying(commands, frame.t);
+      Panel.silent(frame);
       state.order = Panel.contacts(frame, scene, state.chosen, rejected);
       drawn.alerts = Panel.alerts(frame, scene, rejected);
       drawn.camera = Camera.draw(frame.camera, scene);

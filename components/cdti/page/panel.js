@@ -99,6 +99,10 @@ const Panel = (() => {
     }
     put(get("flying"), parts.length ? `flying ${parts.join(", ")}` : "no command is being flown");
   }
+  // Which sensors nothing comes from: what is not shown may be there all the same.
+  function silent(frame) {
+    put(get("silent"), frame.out.length ? `out: ${frame.out.join(", ")}` : "");
+  }
   function status(text) { put(get("status"), text); }
-  return { contacts, alerts, command, replaced, decided, decisions, flying, status, put, list };
+  return { contacts, alerts, command, replaced, decided, decisions, flying, silent, status, put, list };
 })();

@@ -151,7 +151,7 @@ const App = (() => {
     label.appendChild(document.createTextNode(text));
     get("layers").appendChild(label);
   }
-  Data.sensors.forEach((sensor, number) => layer(sensor.name, true,
+  Data.sensors.forEach((sensor, number) => layer(sensor.on ? `${sensor.name} on ${sensor.on}` : sensor.name, true,
     (on) => options.sensors[on ? "add" : "delete"](number), swatch(sensor.marker, () => sensor.colour, true)));
   Data.trackers.forEach((tracker, number) => layer(Data.trackers.length > 1 ? tracker : "tracks", true,
     (on) => options.trackers[on ? "add" : "delete"](number), swatch("D", () => Symbols.tracker(number), false)));

@@ -63,7 +63,7 @@ def reports(workers: int, studies: Sequence[AskedStudy] = STUDIES) -> list[Answe
         study = read_study(find_input_file(asked.study, "study"), sets=asked.sets)
         answer = AnswerOfStudy(study, asked.answers, asked.block, asked.listed, asked.budgets)
         with tempfile.TemporaryDirectory() as folder:
-            if answer.run(Path(folder) / "study", workers, CostProgress(silent=False)):
+            if answer.run(Path(folder), workers, CostProgress(silent=False)):
                 raise KeyboardInterrupt
             made.append(answer.report())
     return made

@@ -1,6 +1,7 @@
-"""``python -m docs.make.outages RISK MOMENT``: the tables of a radar's outages, of docs/scenes.md.
+"""``python -m docs.make.outages RISK MOMENT LINK``: the tables of outages, of docs/scenes.md.
 
-The folders are those of ``dsa-des study radar_outage_risk`` and ``radar_outage_moment``.
+The folders are those of ``dsa-des study radar_outage_risk``, ``radar_outage_moment`` and
+``link_outage_risk``.
 """
 
 import argparse
@@ -17,24 +18,41 @@ _NEVER = "never"
 _LEAD, _MISSED, _OUT = "alert_to_loss_s.alerting", "alert_missed.alerting", "out_share.radar"
 
 
+def ratios_of(folder: Path) -> dict[str, list[str]]:
+    """Return the risk ratios of near collisions and losses with their intervals, by outage."""
+    ratios = pd.read_parquet(folder / "ratios.parquet")
+    found: dict[str, list[str]] = {}
+    for outage, mine in ratios.groupby("outage", sort=False):
+        of = mine.set_index("result")
+        found[str(outage)] = [
+            f"{one.ratio:.2f} ({one.gamma_low:.2f} to {one.gamma_high:.2f})"
+            for one in (of.loc[f"{event}_risk_ratio"] for event in _EVENTS)
+        ]
+    return found
+
+
+def link_rows(folder: Path) -> list[str]:
+    """Return the lines of the table of risk over a link's outages."""
+    head = "| mean time up, to repair | NMAC, risk ratio, 95 % | loss of well clear |"
+    rows = (f"| {outage} | {' | '.join(cells)} |" for outage, cells in ratios_of(folder).items())
+    return [head, "|---" * 3 + "|", *rows]
+
+
 def risk_rows(folder: Path) -> list[str]:
     """Return the lines of the table of risk over outages.
 
     Alerts missed because of an outage are those that the run of the same draws without one has.
     """
-    ratios, runs = (pd.read_parquet(folder / name) for name in ("ratios.parquet", "parts"))
+    runs = pd.read_parquet(folder / "parts")
     lines = [
         "| mean time up, to repair | out | NMAC, risk ratio, 95 % | loss of well clear | "
         "alerts missed | because of it | missed while out |",
         "|---" * 7 + "|",
     ]
     never = runs[runs.outage == _NEVER].set_index("replica")[_MISSED]
+    ratios = ratios_of(folder)
     for outage, mine in runs.groupby("outage", sort=False):
-        of = ratios[ratios.outage == outage].set_index("result")
-        cells = [
-            f"{one.ratio:.2f} ({one.gamma_low:.2f} to {one.gamma_high:.2f})"
-            for one in (of.loc[f"{event}_risk_ratio"] for event in _EVENTS)
-        ]
+        cells = ratios[str(outage)]
         missed = mine.set_index("replica")[_MISSED]
         because = int((missed > never[missed.index]).sum())
         while_out = int(mine["alert_missed_while_out.alerting"].sum())
@@ -67,12 +85,14 @@ def moment_rows(folder: Path) -> list[str]:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code."""
     parser = argparse.ArgumentParser(
-        prog="python -m docs.make.outages", description="Print the tables of a radar's outages."
+        prog="python -m docs.make.outages", description="Print the tables of outages."
     )
     parser.add_argument("risk", type=Path, help="of dsa-des study radar_outage_risk")
     parser.add_argument("moment", type=Path, help="of dsa-des study radar_outage_moment")
+    parser.add_argument("link", type=Path, help="of dsa-des study link_outage_risk")
     folders = parser.parse_args(arguments)
-    for line in (*risk_rows(folders.risk), "", *moment_rows(folders.moment)):
+    tables = risk_rows(folders.risk), moment_rows(folders.moment), link_rows(folders.link)
+    for line in (*tables[0], "", *tables[1], "", *tables[2]):
         say(line)
     return 0
 

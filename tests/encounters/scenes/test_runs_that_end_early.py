@@ -1,5 +1,7 @@
 """Runs that end when the closest approaches are passed: when, and what of them is left."""
 
+import itertools
+
 import crooked
 import numpy as np
 import pytest
@@ -36,17 +38,17 @@ def looks_s(scan_rate_hz=1.0, offset_s=0.0, rate_error_ppm=0.0):
     return np.arange(offset_s, MEANT_S, period_s)
 
 
-def expected_s(times_s, after_s=20.0, beyond_m=0.0, targets=crooked.TARGETS):
-    """The rule, look by look and aircraft by aircraft."""
+def expected_s(times_s, after_s=20.0, beyond_m=0.0, targets=crooked.TARGETS, between="ownship"):
+    """The rule, look by look and pair by pair."""
     last, since = {}, {}
     for time_s in times_s:
         passed = []
-        for target in targets:
-            name = target["name"]
-            apart_m = np.linalg.norm(
-                crooked.position(target, time_s, crooked.OWNSHIP)
-                - crooked.position(crooked.OWNSHIP, time_s)
-            )
+        places = {None: crooked.position(crooked.OWNSHIP, time_s)}
+        places |= {of["name"]: crooked.position(of, time_s, crooked.OWNSHIP) for of in targets}
+        for name in itertools.combinations(places, 2):
+            if None not in name and between != "any two":
+                continue
+            apart_m = np.linalg.norm(places[name[0]] - places[name[1]])
             if not apart_m > last.get(name, np.inf):
                 since[name] = time_s
             last[name] = apart_m
@@ -126,6 +128,23 @@ def test_the_last_one_to_pass_decides_and_who_stays_near_holds_the_run():
         del beside[key]
     closing = {**beside, "heading_deg": 217.3}
     assert run(scene([*crooked.TARGETS, closing], after_s=2)).info["duration_s"] == MEANT_S
+
+
+@covers("between", of=KIND)
+def test_between_any_two_a_run_lasts_until_two_behind_the_ownship_have_passed():
+    """Both move away from the ownship all the time, and meet after 25 s."""
+    level = {**crooked.ROLLING, "up_m": 40.0, "climb_mps": 3.0}
+    targets = [
+        {**level, "name": "east", "east_m": 600.0, "north_m": 1600.0, "heading_deg": 90.0},
+        {**level, "name": "west", "east_m": 3600.0, "north_m": 1650.0, "heading_deg": 270.0},
+    ]
+    found = []
+    for between in ("ownship and others", "any two"):
+        end_s = expected_s(looks_s(), after_s=3, targets=targets, between=between)
+        keys = {"after_s": 3, "between": between}
+        assert run(scene(targets, **keys)).info["duration_s"] == end_s
+        found.append(end_s)
+    assert found[0] < 10.0 < 25.0 < found[1] < MEANT_S
 
 
 #: A target that is passed, turns round fast and comes nearer than before, but later.

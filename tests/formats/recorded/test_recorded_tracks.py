@@ -82,6 +82,10 @@ def test_heights_that_are_none_are_said(tmp_path):
     some = write.gpx({"one": FIXES}).replace(b"<ele>1000.0</ele>", b"")
     warnings = read(tmp_path, "a.gpx", some).notes.warnings
     assert warnings == ["1 point was left out that had no height"]
+    with pytest.raises(
+        TrafficFileError, match=r"point 1, column geometric .* 100001000\.0 is out of"
+    ):
+        read(tmp_path, "a.gpx", write.gpx({"one": FIXES}).replace(b"<ele>10", b"<ele>1000010"))
     low = write.kml({"one": FIXES}).replace(b">absolute<", b">relativeToGround<")
     (warning,) = read(tmp_path, "a.kml", low).notes.warnings
     assert warning.startswith("heights are above ground (altitudeMode relativeToGround)")

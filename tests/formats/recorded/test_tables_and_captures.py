@@ -186,9 +186,7 @@ def test_plots_of_a_radar_are_read_out_of_a_capture(tmp_path):
         np.testing.assert_array_equal(other.entries[name], values)
     assert other.entries["range_m"] == pytest.approx([30_000, 30_100, 30_200], abs=4)
     assert captured_asterix(plain) is None
-    with pytest.raises(
-        TrafficFileError, match=r"its 3 plots of radars \(048\) are no aircraft yet"
-    ):
+    with pytest.raises(TrafficFileError, match=r"none of its 3 plots of radars \(048\) says whose"):
         record(captured)
 
 

@@ -58,6 +58,8 @@ def found(tmp_path: Path, *targets: dict[str, Any], **keys: Any) -> dict[str, An
 def test_times_from_the_alert_to_what_it_warns_of(tmp_path, level, first_s):
     got = found(tmp_path, level=level)
     assert got["first_alert_time_s"] == pytest.approx(first_s + 0.25, abs=0.3)
+    apart_m = math.hypot(BEHIND_M - CLOSING_MPS * got["first_alert_time_s"], 60.0)
+    assert got["first_alert_range_m"] == pytest.approx(apart_m, abs=0.5)
     assert got["alert_to_loss_s"] == pytest.approx(30.0 - got["first_alert_time_s"], abs=0.15)
     assert got["alert_to_nmac_s"] == pytest.approx(35.0 - got["first_alert_time_s"], abs=0.15)
     assert (got["alert_missed"], got["alert_nuisance"]) == (0, 0)
@@ -90,7 +92,7 @@ def test_an_alert_for_what_passes_above_is_a_nuisance(tmp_path):
 def test_a_loss_without_an_alert_is_missed(tmp_path):
     got = found(tmp_path, level=3)
     assert (got["alert_missed"], got["alert_late"], got["alert_nuisance"]) == (1, 1, 0)
-    assert math.isnan(got["first_alert_time_s"])
+    assert math.isnan(got["first_alert_time_s"]) and math.isnan(got["first_alert_range_m"])
 
 
 @covers("target", of=KIND)
@@ -98,6 +100,7 @@ def test_one_target_may_count(tmp_path):
     two = behind("near", BEHIND_M, 60.0), behind("far", BEHIND_M + 400.0, 60.0)
     both, far = found(tmp_path, *two), found(tmp_path, *two, target="far")
     assert far["first_alert_time_s"] == pytest.approx(both["first_alert_time_s"] + 10, abs=0.3)
+    assert far["first_alert_range_m"] == pytest.approx(both["first_alert_range_m"], abs=12.0)
 
 
 @covers("step_s", of=KIND)

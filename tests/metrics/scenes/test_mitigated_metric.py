@@ -134,3 +134,11 @@ def test_time_counts_in_both():
     """Passed too far aside to be within 300 m, but so fast at first that tau is short."""
     assert events(horizontal_m=100.0)["well_clear_lost_mitigated"] == 0
     assert events(horizontal_m=100.0, tau_s=60.0)["well_clear_lost_mitigated"] == 1
+
+
+def test_where_nobody_is_told_anything_events_are_those_without_manoeuvres():
+    quiet = scene()
+    quiet["duration_s"] = 3
+    found = measured(quiet, {"metric": "mitigated", **SIZES, "horizontal_m": 3000.0})
+    assert found["well_clear_lost_mitigated"] == found["well_clear_lost_nominal"] == 1.0
+    assert found["nmac_mitigated"] == found["nmac_nominal"] == 0.0

@@ -7,13 +7,13 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.special import spherical_jn, spherical_yn
 
-from components.radar.ground_clutter import ground_ring_rcs_m2
-from components.radar.rain import (
+from components.atmosphere.rain_echo import (
     fall_speed_m_s,
     rain_reflectivity_per_m,
     rain_shell_m3,
     rain_volume_m3,
 )
+from components.radar.ground_clutter import ground_ring_rcs_m2
 
 LIGHT_M_S = 299_792_458.0
 

@@ -73,14 +73,19 @@ def test_the_mean_share_is_one_less_the_duty_factor():
 
 
 def test_three_prfs_of_7_8_and_9_cells_resolve_504():
-    """Skolnik's Radar Handbook's example: (288 A1 + 441 A2 + 280 A3) mod 504, by remainders."""
+    """By the Chinese remainder theorem: the number of cells that leaves all three remainders."""
     cell_m = 150.0
     number = np.arange(0, 700)
     prfs = [C / 2.0 / (cells * cell_m) for cells in (7, 8, 9)]
     found = coincident_range_m(
         number * cell_m, prfs_hz=prfs, seen=np.ones((3, len(number)), bool), tolerance_m=75.0
     )
-    by_remainders = [(288 * (n % 7) + 441 * (n % 8) + 280 * (n % 9)) % 504 for n in number.tolist()]
+    whole, factors = math.prod((7, 8, 9)), (7, 8, 9)
+    inverse = [whole // m * pow(whole // m, -1, m) for m in factors]
+    by_remainders = [
+        sum(of * (n % m) for of, m in zip(inverse, factors, strict=True)) % whole
+        for n in number.tolist()
+    ]
     assert by_remainders[503] == 503 and by_remainders[600] == 96
     assert found / cell_m == pytest.approx(by_remainders, abs=1e-9)
     # Two of them resolve 56, 63 and 72 cells; the third one is deaf.
@@ -256,12 +261,18 @@ def test_impossible_pulses_are_refused(keys, said):
     assert "radar" in str(error.value)
 
 
-def test_folded_ground_is_said_to_be_left_out():
+@pytest.mark.parametrize("tracker", ["tracking.ekf", "tracking.stub"])
+def test_a_tracker_says_that_it_takes_folded_ranges_for_true(tracker):
     keys = {"prf_hz": 1e4, "range_folds": True, "range_km": 20.0, "azimuth_resolution_deg": 2.0,
-            "elevation_resolution_deg": 2.0, "range_resolution_m": 50.0}  # fmt: skip
-    scene = chain({"radar": sensor("radar.threshold", **keys)}, terrain={"height_m": 0.0})
-    said = notes_of_scene(Simulation(dsa_des.load_scene(scene)))
-    assert len([line for line in said if "ground and rain do not fold" in line]) == 1
-    del scene["terrain"]
-    said = notes_of_scene(Simulation(dsa_des.load_scene(scene)))
-    assert not [line for line in said if "do not fold" in line]
+            "elevation_resolution_deg": 2.0, **GRID}  # fmt: skip
+    for more, folds in (
+        ({}, True),
+        ({"range_km": 14.0}, False),
+        ({"other_prfs_hz": [9e3, 11e3]}, False),
+    ):
+        radar = sensor("radar.threshold", **keys | more)
+        made = chain({"radar": radar}, fusion={"type": "fusion.pass_through"},
+                     tracker={"type": tracker})  # fmt: skip
+        said = notes_of_scene(Simulation(dsa_des.load_scene(made)))
+        found = [line for line in said if "ranges of radar fold at 14.99 km" in line]
+        assert len(found) == folds and all("blocks.tracker" in line for line in found)

@@ -15,7 +15,8 @@ from scipy.integrate import quad
 from wired import chain, first_look, noise_crosses, run, sensor
 
 import dsa_des
-from components.radar.rain import RainEcho, fall_speed_m_s, rain_spread_m_s
+from components.atmosphere.rain_echo import fall_speed_m_s, rain_spread_m_s
+from components.radar.rain import RainEcho
 from dsa_des.errors import SceneError
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation

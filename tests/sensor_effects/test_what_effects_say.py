@@ -13,6 +13,7 @@ RADAR = {
 }  # fmt: skip
 CAMERA = {"type": "optical.ir", "scan_rate_hz": 1, "azimuth_pixels": 640, "elevation_pixels": 480}
 OF_ALL = """
+weather cells: not simulated, [weather] has no cells
 cues: not simulated, no wire brings cues
 mounting: not simulated, it looks along the nose and misalignment_deg is 0
 glint: not simulated, errors is 'grid'
@@ -36,6 +37,8 @@ eclipsing: not simulated, pulse_width_s is not given
 range folding: not simulated, range_folds is false
 beam shape: not simulated, beam_shape_loss is false
 ground clutter: not simulated, [terrain] height_m is not given
+folded clutter: not simulated, range_folds is false
+multipath: not simulated, [terrain] height_m is not given
 rain echo: not simulated, [weather] rain_rate_mm_h is 0
 sidelobe clutter: not simulated, sidelobe_level_db is not given
 moving target filter: not simulated, moving_target_filter is 'none'
@@ -91,6 +94,7 @@ declaration by place: simulated, the sensor has false alarms, and declare_by is 
         "false_alarms": True, "clutter_threshold": "noise", "sidelobe_level_db": -30.0,
         "declare_by": "place", "declare_m": 2, "declare_n": 3, "declare_speed_m_s": 100.0,
     }, {"terrain": {"height_m": -250.0}, "weather": {"rain_rate_mm_h": 0.5}}, """
+multipath: not simulated, [terrain] roughness_m is not given
 rain: simulated, [weather] rain_rate_mm_h is 0.5
 ground clutter: simulated, [terrain] height_m is -250
 rain echo: simulated, [weather] rain_rate_mm_h is 0.5

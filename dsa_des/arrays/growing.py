@@ -1,0 +1,52 @@
+"""Arrays that grow at their end again and again, each state of which stays as it was."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any, Self
+
+import numpy as np
+
+from dsa_des.arrays.types import AnyArray
+
+
+class GrowingArray:
+    """An array (..., n) with room for more at its end.
+
+    What has more of it shares its memory, so that adding n times moves each value a few times and
+    not n times. Two that grew out of one do not see each other's: the second one moves.
+    """
+
+    def __init__(self, values: AnyArray) -> None:
+        self.values = self._room = values
+        #: How much of the room is taken by the longest that shares it.
+        self._taken = [values.shape[-1]]
+
+    def with_more(self, values: AnyArray) -> GrowingArray:
+        """Return an array with more values at its end."""
+        begin = self.values.shape[-1]
+        end = begin + values.shape[-1]
+        longer = copy(self)
+        if self._taken[0] != begin or end > self._room.shape[-1]:
+            shape = (*self.values.shape[:-1], 2 * end)
+            longer._room, longer._taken = np.empty_like(self.values, shape=shape), [begin]
+            longer._room[..., :begin] = self.values
+        longer._room[..., begin:end] = values
+        longer._taken[0] = end
+        longer.values = longer._room[..., :end]
+        return longer
+
+
+class Growing:
+    """What holds such arrays as attributes."""
+
+    def with_more(self, **more: AnyArray) -> Self:
+        """Return a copy of which some arrays have more at their end."""
+        rooms: dict[str, Any] = dict(self.__dict__.get("_rooms", {}))
+        longer = copy(self)
+        for name, values in more.items():
+            room = rooms.get(name) or GrowingArray(getattr(self, name))
+            rooms[name] = room.with_more(values)
+            longer.__dict__[name] = rooms[name].values
+        longer.__dict__["_rooms"] = rooms
+        return longer

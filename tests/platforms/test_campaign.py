@@ -1,0 +1,39 @@
+"""The published campaign: counts of several folders, and whose interval holds whose."""
+
+import pandas as pd
+from click.testing import CliRunner
+
+from docs.make.platforms.campaign import counted, rows
+from dsa_des.cli import main
+
+
+def test_runs_of_a_cell_count_together_and_are_held_against_the_published_ones():
+    many = {"crossing_deg": 90, "error_m": 30, "well_clear_lost_mitigated": [1.0] * 3 + [0.0] * 997}
+    first = pd.DataFrame(many)
+    more = pd.DataFrame(many | {"well_clear_lost_mitigated": [1.0] + [0.0] * 999})
+    rings = {"aircraft": 8, "error_m": 5, "well_clear_lost_mitigated": [1.0] * 50 + [0.0] * 50}
+    studies = [first, more, pd.DataFrame(rings)]
+    assert counted(studies) == {("pair, 90°", 30): (4, 2000), ("ring of 8", 5): (50, 100)}
+    pair, ring = rows(studies)[2:]
+    # Wilson's interval of 4 of 2,000 holds 61 of 54,900, whose own ends at 1.43e-3.
+    assert pair == (
+        "| pair, 90° | 30 | 4 | 2,000 | 2.00e-3 (7.78e-4 to 5.13e-3) | "
+        "1.11e-3 (8.65e-4 to 1.43e-3) | no |"
+    )
+    assert ring.endswith("| no |") and "5.00e-1" in ring
+
+
+def test_pairs_of_the_shipped_study_meet_where_both_fly_on_and_all_cells_of_both_run(tmp_path):
+    within = "metrics=[{metric='mitigated', horizontal_m=%s, vertical_m=50, nmac_horizontal_m=0.5}]"
+    for study, keys in {
+        "velocity_pairs": ("set.duration_s=78", within % 1),
+        "velocity_rings": ("set.duration_s=2",),
+    }.items():
+        sets = [word for key in ("replicas=1", *keys) for word in ("--set", key)]
+        end = ("--workers", "1", "--quiet", "--no-figures", "--out", str(tmp_path / study))
+        done = CliRunner().invoke(main, ["study", study, *sets, *end])
+        assert done.exit_code == 0, done.output
+        runs = pd.read_parquet(tmp_path / study / "parts")
+        assert len(counted([runs])) == 12
+        if study == "velocity_pairs":
+            assert (runs["well_clear_lost_nominal"] == 1.0).all()
