@@ -83,6 +83,10 @@ def test_histories_as_people_keep_them(tmp_path):
         assert [one for one in file.warnings if "cut off" in one] == said
     with pytest.raises(TrafficFileError, match="line 2: is no JSON that can be read"):
         read(tmp_path, lines.replace('"now": 1700000001', "now"))
+    first = json.dumps(HISTORY[0], indent=1)
+    begins = first.count("\n") + 3
+    with pytest.raises(TrafficFileError, match=f"line {begins}: is no JSON that can be read"):
+        read(tmp_path, first + '\n\n{"now": ')
     with pytest.raises(TrafficFileError, match="there are no samples in it; time, latitude"):
         read(tmp_path, [snapshot(1.0)])
 

@@ -44,7 +44,7 @@ _LEFT_OUT = {
 #: Of these the order of arguments does not matter (but to NaN, in Python's own `min` and `max`).
 _EITHER_WAY = {
     "min", "max", "minimum", "maximum", "fmin", "fmax", "hypot", "gcd", "lcm", "array_equal",
-    "logical_and", "logical_or", "logical_xor", "union1d",
+    "logical_and", "logical_or", "logical_xor", "union1d", "np.add", "np.multiply",
 }  # fmt: skip
 #: Keywords that say what is so without them, or what only saves memory.
 _NEEDLESS = {
@@ -284,7 +284,9 @@ def _of_calls(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
         return
     given, keywords = node.args, node.keywords
     called = ast.unparse(node.func).rpartition(".")[2]
-    either_way = called in _EITHER_WAY and all(each.arg == "out" for each in keywords)
+    either_way = bool({called, ast.unparse(node.func)} & _EITHER_WAY) and all(
+        each.arg == "out" for each in keywords
+    )
     for k, (one, other) in enumerate(pairwise(given)):
         if _is_text(one) != _is_text(other) or either_way:
             continue

@@ -56,13 +56,13 @@ def test_every_mistake_is_found_and_nothing_that_is_declared_or_said():
 
 
 def test_what_means_the_same_is_no_mistake():
-    text = (
-        "max(2, b)\nnp.minimum(a, b, out=c)\nmax(2, b, key=f)\njson.dumps(a, ensure_ascii=True)\n"
-    )
+    text = "max(2, b)\nnp.minimum(a, b, out=c); np.add(a, b); known.add(a, b)\nmax(2, b, key=f)\n"
+    text += "json.dumps(a, ensure_ascii=True)\n"
     text += "np.zeros(n, dtype=np.float64)\nnp.zeros(n, dtype=int)\nnp.fromiter(a, int, count=n)\n"
     found = [f for f in faults_of("a/b.py", text) if f.operator.endswith(("arguments", "keyword"))]
     assert [(f.line, f.change.partition("  →  ")[2]) for f in found] == [
-        (2, "np.minimum(a, b)"), (3, "max(b, 2, key=f)"), (3, "max(2, b)"), (6, "np.zeros(n)"),
+        (2, "np.minimum(a, b)"), (2, "known.add(b, a)"), (3, "max(b, 2, key=f)"),
+        (3, "max(2, b)"), (6, "np.zeros(n)"),
         (7, "np.fromiter(int, a, count=n)"),
     ]  # fmt: skip
 

@@ -23,7 +23,8 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("folders", type=Path, nargs="+", help="of studies")
     folders = parser.parse_args(arguments).folders
-    runs = [pd.read_parquet(folder / "parts") for folder in folders]
+    found = (pd.read_parquet(folder / "parts") for folder in folders)
+    runs = [one for one in found if len(one)]  # nothing is there yet of one just begun
     rows = equipage.rows if "equipage" in runs[0] else campaign.rows
     rows = link_latency.rows if link_latency.LATENCY in runs[0] else rows
     for line in rows(runs):

@@ -19,6 +19,8 @@ PUBLISHED = {
 }
 _AXES = {"crossing_deg": "pair, {}°", "aircraft": "ring of {}"}
 _CONFIDENCE = 0.95
+#: Of fewer events an interval says little.
+_LEAST = 50
 
 
 def counted(studies: Sequence[Any]) -> dict[tuple[str, int], tuple[int, int]]:
@@ -48,6 +50,7 @@ def rows(studies: Sequence[Any]) -> list[str]:
             theirs = _words(other)
             inside = ours[1] <= other[0] <= ours[2] and other[1] <= ours[0] <= other[2]
             agree = "yes" if inside else "no"
+            agree = agree if min(events, PUBLISHED[cell][0]) >= _LEAST else f"under {_LEAST} lost"
         what, error_m = cell
         lines.append(
             f"| {what} | {error_m} | {events} | {runs:,} | {_words(ours)} | {theirs} | {agree} |"
