@@ -8,7 +8,12 @@ import numpy as np
 from pydantic import Field
 
 from components.arguments.units import FOOT_M, STANDARD_GRAVITY_M_S2
-from components.guidance.daidalus import ConfParameters, changes_out, smaller, why_never_steers
+from components.guidance.daidalus import (
+    ConfParameters,
+    changes_out_of_bands,
+    explain_no_steering,
+    smaller,
+)
 from components.messages.alerts import AlertLevels
 from components.messages.detections import without_range
 from components.messages.steering import (
@@ -141,7 +146,7 @@ class TurnOut(Component):
 
     def warnings(self) -> list[str]:
         """Say why it never steers, where that is so."""
-        return why_never_steers(
+        return explain_no_steering(
             self.p.level, self._configuration, self._alerter, self.context.producers
         )
 
@@ -165,12 +170,12 @@ class TurnOut(Component):
                 tick = int(wake.ticks[index])
                 if run in now:
                     later.append((index, run))
-                elif tick >= self._free_from.get(run, 0) or self._gives_way(run, tick):
+                elif tick >= self._free_from.get(run, 0) or self._must_give_way(run, tick):
                     now[run] = index
                 elif self.p.address is not None:
-                    told[index] = self._repeated(run, tick)
+                    told[index] = self._repeated_side(run, tick)
             rows = list(now.values())
-            result = changes_out(kind, self._configuration, self._alerter, alerts, rows)
+            result = changes_out_of_bands(kind, self._configuration, self._alerter, alerts, rows)
             for (run, index), changes in zip(now.items(), result, strict=True):
                 tick = int(wake.ticks[index])
                 change = None if changes is None else self._choose(run, tick, changes)
@@ -182,7 +187,7 @@ class TurnOut(Component):
                     self._free_from[run] = tick + self._pause_ticks
                     self._chosen[run] = tick, 1 if change > 0.0 else -1
                 if self.p.address is not None:
-                    told[index] = self._repeated(run, tick)
+                    told[index] = self._repeated_side(run, tick)
             waiting = later
         messages = {
             "manoeuvres": Manoeuvres.at_rows(wake.instants, manoeuvres),
@@ -191,7 +196,7 @@ class TurnOut(Component):
         return {port: message for port, message in messages.items() if message is not None}
 
     def _hear(self, wake: Wake) -> None:
-        """Take in what others have told, each the last thing of its own."""
+        """Take in the latest choice of each other aircraft."""
         since = int(wake.ticks[0]) - int(self.p.heeds_s * self.context.ticks_per_s)
         for new in wake.arrivals("told") if self.p.address is not None else ():
             sides = new.message
@@ -200,8 +205,8 @@ class TurnOut(Component):
                 known = [old for old in self._heard.get(run, ()) if old[0] > since]
                 self._heard[run] = (*known, (one[0], one[1], one[2]))
 
-    def _others(self, run: int, tick: int) -> list[tuple[int, int]]:
-        """Return address and side of all that have told theirs and count at an instant.
+    def _other_choices(self, run: int, tick: int) -> list[tuple[int, int]]:
+        """Return address and side of every other aircraft whose choice is valid at an instant.
 
         The lowest address first; windows may know more than has come by then.
         """
@@ -209,11 +214,11 @@ class TurnOut(Component):
         last = {a: side for at, a, side in self._heard.get(run, ()) if since < at <= tick}
         return sorted(last.items())
 
-    def _with(self, side: int) -> int:
+    def _matching_side(self, side: int) -> int:
         """Return the side that goes with another one's: both to the right, one up and one down."""
         return side if self.p.manoeuvre == "turn" else -side
 
-    def _repeated(self, run: int, tick: int) -> int:
+    def _repeated_side(self, run: int, tick: int) -> int:
         """Return the side that was chosen in this conflict, which an alert prolongs; 0: none."""
         at, side = self._chosen.get(run, (-1, 0))
         if not side or tick - at > int(self.p.heeds_s * self.context.ticks_per_s):
@@ -221,23 +226,24 @@ class TurnOut(Component):
         self._chosen[run] = tick, side
         return side
 
-    def _gives_way(self, run: int, tick: int) -> bool:
+    def _must_give_way(self, run: int, tick: int) -> bool:
         """Whether a lower address has chosen what does not go with its own choice."""
-        mine = self._repeated(run, tick) if self.p.address is not None else 0
-        first = [side for a, side in self._others(run, tick) if a < (self.p.address or 0)]
-        return bool(mine and first and self._with(first[0]) != mine)
+        mine = self._repeated_side(run, tick) if self.p.address is not None else 0
+        first = [side for a, side in self._other_choices(run, tick) if a < (self.p.address or 0)]
+        return bool(mine and first and self._matching_side(first[0]) != mine)
 
     def _choose(self, run: int, tick: int, changes: tuple[float, float]) -> float | None:
-        """Return the change to fly: the smaller one, or that which goes with what others told.
+        """Return the change to fly: the smaller one, or the one compatible with the others'
+        choices.
 
         Without a way there it is free.
         """
-        others = self._others(run, tick) if self.p.address is not None else []
-        mine = self._repeated(run, tick)
+        others = self._other_choices(run, tick) if self.p.address is not None else []
+        mine = self._repeated_side(run, tick)
         if mine and self.p.address is not None:  # only a lower address changes what was chosen
             others = [(a, side) for a, side in others if a < self.p.address]
         if others:
-            there = changes[1] if self._with(others[0][1]) > 0 else changes[0]
+            there = changes[1] if self._matching_side(others[0][1]) > 0 else changes[0]
             if math.isfinite(there):
                 return there
         return smaller(changes)

@@ -18,7 +18,7 @@ import tempfile
 import threading
 import types
 
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 
 _LIBRARIES = (
     "numpy", "scipy.special", "scipy.optimize", "pydantic", "pyarrow.parquet", "simpy", "networkx",
@@ -41,7 +41,7 @@ def load() -> None:
     build_models()
     for group in importlib.metadata.entry_points().groups:
         if group.startswith("dsa_des."):
-            registered(group)
+            entry_points_of(group)
     gc.collect()
     gc.freeze()
 
@@ -138,7 +138,7 @@ def _take(job: dict, stdout: int, stderr: int) -> None:
     sys.path[:] = path
     importlib.invalidate_caches()
     if asked != before:
-        registered.cache_clear()
+        entry_points_of.cache_clear()
 
 
 def begin(job: dict) -> None:

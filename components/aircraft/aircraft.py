@@ -132,7 +132,7 @@ OWNSHIP = "ownship"
 _LEAST_EXTENT_M = 0.01
 
 
-def _alike(one: Aircraft, other: Aircraft) -> bool:
+def _is_alike(one: Aircraft, other: Aircraft) -> bool:
     """Return whether two aircraft are the same to every sensor, wherever they fly."""
     return one is other or all(
         getattr(one, name) == getattr(other, name) for name in Aircraft.model_fields
@@ -154,7 +154,7 @@ class Roster:
     own_aircraft: tuple[Aircraft, ...] = (Aircraft(),)
 
     @classmethod
-    def of(
+    def from_pairs(
         cls,
         targets: Sequence[tuple[str, Aircraft]],
         own: tuple[str, Aircraft] = (OWNSHIP, Aircraft()),
@@ -174,7 +174,7 @@ class Roster:
         return cls(names, aircraft, own[0], (own[1],))
 
     def seen_from(self, target: int) -> "Roster":
-        """Return the roster of who looks from a target: it and whose roster it is change places."""
+        """Return the roster as seen from a target: the target and the ownship are exchanged."""
         known: dict[int, Roster] = self.__dict__.setdefault("_seen_from", {})
         if target not in known:
             width, own = len(self.names), self.own_aircraft
@@ -195,8 +195,8 @@ class Roster:
             isinstance(other, Roster)
             and self.names == other.names
             and self.own_name == other.own_name
-            and all(map(_alike, self.aircraft, other.aircraft))
-            and all(map(_alike, self.own_aircraft, other.own_aircraft))
+            and all(map(_is_alike, self.aircraft, other.aircraft))
+            and all(map(_is_alike, self.own_aircraft, other.own_aircraft))
         )
 
     def __hash__(self) -> int:
@@ -247,7 +247,7 @@ class Roster:
     def equipage(self) -> Equipage:
         """What all aircraft carry for others to know them by."""
         keys = np.tile(self.keys, len(self.aircraft) // max(1, len(self.names)))
-        return Equipage.of(self.aircraft, keys)
+        return Equipage.from_aircraft(self.aircraft, keys)
 
     @cached_property
     def engines(self) -> AnyArray:
@@ -265,13 +265,13 @@ class Roster:
         return tuple(sorted({craft.swerling % 5 for craft in self.aircraft}))
 
     @property
-    def shared(self) -> bool:
+    def is_shared(self) -> bool:
         """Whether all replicas have the same aircraft."""
         return len(self.aircraft) == len(self.names)
 
     def craft(self, target: IntArray, replica: IntArray) -> IntArray:
         """Return which of the aircraft some targets of replicas are."""
-        return target if self.shared else replica * len(self.names) + target
+        return target if self.is_shared else replica * len(self.names) + target
 
     def column(self, path: str) -> FloatArray:
         """Return one number per target, for example ``"ir.front_m2"``, shape (targets,)."""
@@ -339,7 +339,7 @@ def _fit(one: tuple[str, Aircraft], other: tuple[str, Aircraft]) -> bool | None:
     """Return whether an aircraft is the same as another's, None where no roster holds both."""
     if one[0] != other[0]:
         return None
-    if _alike(one[1], other[1]):
+    if _is_alike(one[1], other[1]):
         return True
     differing = (
         field

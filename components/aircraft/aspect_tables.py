@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
 from components.arguments.units import FOOT_M
-from components.geometry import past
+from components.geometry import remainder
 from dsa_des.block.parameters import refuse_extremes
 from dsa_des.files.input_files import InputFileError, read_input_text
 
@@ -67,7 +67,7 @@ class RcsTable:
     def dbsm(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> Any:
         """Return the RCS in dBsm seen from a direction."""
         nodes = self.azimuth_deg, self.elevation_deg
-        return _interpolated(*nodes, self.rcs_dbsm, azimuth_rad, elevation_rad)
+        return _interpolate(*nodes, self.rcs_dbsm, azimuth_rad, elevation_rad)
 
     def rcs_m2(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> Any:
         """Return the RCS in m² seen from a direction; see `dbsm`."""
@@ -118,7 +118,7 @@ class SilhouetteTable:
     def area(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> Any:
         """Return the area in m² seen from a direction."""
         nodes = self.azimuth_deg, self.elevation_deg
-        return _interpolated(*nodes, self.area_m2, azimuth_rad, elevation_rad)
+        return _interpolate(*nodes, self.area_m2, azimuth_rad, elevation_rad)
 
 
 def table_from_nodes(
@@ -150,7 +150,7 @@ def read_aspect_table(path: str | PathLike[str]) -> SilhouetteTable:
         raise ValueError(f"{path}: {error}") from None
 
 
-def _interpolated(
+def _interpolate(
     nodes_deg: FloatArray,
     levels: FloatArray,
     table: FloatArray,
@@ -165,7 +165,7 @@ def _interpolated(
     degrees = elevation * (180.0 / np.pi)
     refuse("elevation_rad", elevation, np.abs(degrees) > _POLE_DEG, "lie in [-pi/2, pi/2]")
     first = nodes_deg[0]
-    turned = past(azimuth * (180.0 / np.pi) - first, 360.0)
+    turned = remainder(azimuth * (180.0 / np.pi) - first, 360.0)
     nodes = np.append(nodes_deg - first, 360.0)
     left = np.searchsorted(nodes, turned, side="right") - 1
     right = np.where(left + 2 == nodes.size, 0, left + 1)
@@ -211,7 +211,7 @@ def _grid_of(
     if len({column.size for column in columns}) != 1 or columns[0].size == 0:
         sizes = ", ".join(str(column.size) for column in columns)
         raise ValueError(f"az_deg, el_deg and {name} have {sizes} rows: they must agree")
-    columns[0] = past(columns[0], 360.0)
+    columns[0] = remainder(columns[0], 360.0)
     known: dict[tuple[float, float], float] = {}
     for az, el, value in zip(*(column.tolist() for column in columns), strict=True):
         if known.setdefault((az, el), value) != value:

@@ -94,7 +94,7 @@ class AdsBEquipage(Parameters):
     )
 
     @model_validator(mode="after")
-    def _compensates_what_there_is(self) -> Self:
+    def _check_compensation(self) -> Self:
         if self.compensated_s > self.latency_s:
             raise ValueError(
                 f"compensated_s is {self.compensated_s:g}: it must be at most latency_s, "
@@ -156,7 +156,7 @@ class Equipage:
         return self.latency_s - self.compensated_s
 
     @classmethod
-    def of(cls, aircraft: Sequence[Any], keys: NDArray[np.uint64]) -> Self:
+    def from_aircraft(cls, aircraft: Sequence[Any], keys: NDArray[np.uint64]) -> Self:
         """Return the equipage of aircraft; `keys` give addresses to those without their own."""
         # A large fleet is of few kinds.
         kinds = {id(one): one for one in aircraft}

@@ -38,9 +38,9 @@ class KnownTraffic:
         return self._views[target]
 
     @property
-    def asked(self) -> bool:
+    def was_asked(self) -> bool:
         """Whether a block went by where the targets can be."""
-        return self._asked or any(view.asked for view in self._views.values())
+        return self._asked or any(view.was_asked for view in self._views.values())
 
     def envelope(self, reach_m: float, lasts_s: float) -> Any:
         """Return the run's envelope for a reach, or None."""
@@ -53,7 +53,7 @@ class KnownTraffic:
         return self is other or (
             isinstance(other, KnownTraffic)
             and self.roster == other.roster
-            and not (self.asked or other.asked)
+            and not (self.was_asked or other.was_asked)
         )
 
     def __hash__(self) -> int:

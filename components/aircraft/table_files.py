@@ -9,7 +9,7 @@ from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
 from dsa_des.block.component import ScenePath
 from dsa_des.files.input_files import InputFileError, read_once, status_of
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 #: A table of every degree in both angles is a hundredth of it.
 LARGEST_TABLE_BYTES = 64 * 1024 * 1024
@@ -41,7 +41,7 @@ def _silhouette(path: Path) -> Any:
 
 
 @read_once(64)
-def _read(path: Path, reader: Callable[[Path], Any]) -> TableFile:
+def _read_table_file(path: Path, reader: Callable[[Path], Any]) -> TableFile:
     # Aircraft that name the same file share one table, and are looked up in it together.
     status_of(path, LARGEST_TABLE_BYTES)
     return TableFile(path, reader(path))
@@ -52,9 +52,9 @@ def _validator(reader: Callable[[Path], Any]) -> Callable[[Any], TableFile]:
         if isinstance(value, TableFile):
             return value
         path = _PATH.validate_python(value)
-        name = shortened(str(path), 300)
+        name = shorten(str(path), 300)
         try:
-            return _read(path, reader)
+            return _read_table_file(path, reader)
         except InputFileError as error:
             raise ValueError(f"must be a table that can be read: {name}: {error}") from None
 

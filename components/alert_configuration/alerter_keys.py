@@ -23,7 +23,7 @@ from components.formats.text_rows import MOST_OF_A_CELL, Problems, did_you_mean
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 from dsa_des.errors import nearest
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 #: Of each key in lower case its line number, the key as written and the text of its value.
 Lines = dict[str, tuple[int, str, str]]
@@ -66,7 +66,7 @@ class AlerterKeys:
         prefixes = {name: name.lower() + "_" for name in sorted(names, key=len, reverse=True)}
         self._beginnings = {prefix: name + "_" for name, prefix in prefixes.items()}
         result = {name: self._alerter(name, prefix, number) for name, prefix in prefixes.items()}
-        self._leave_out(tuple(prefixes.values()))
+        self._ignore_alerters(tuple(prefixes.values()))
         for name, prefix in prefixes.items():
             self._note_idle_detectors(name, prefix)
         self._note_unknown()
@@ -81,8 +81,8 @@ class AlerterKeys:
         count = max(of_level, default=0)
         if not of_level:
             self._problems.add(
-                f"the alerter {shortened(name)!r} has no levels: {name}_alert_1_detector and "
-                f"others are needed{did_you_mean(name, self._others(prefix))}",
+                f"the alerter {shorten(name)!r} has no levels: {name}_alert_1_detector and "
+                f"others are needed{did_you_mean(name, self._other_alerters(prefix))}",
                 line=named_in,
             )
             return None
@@ -90,7 +90,7 @@ class AlerterKeys:
         for number in range(1, count + 1):
             if number not in of_level:
                 self._problems.add(
-                    f"the alerter {shortened(name)!r} has level {count} but no level {number}",
+                    f"the alerter {shorten(name)!r} has level {count} but no level {number}",
                     line=named_in,
                 )
                 return None
@@ -135,8 +135,8 @@ class AlerterKeys:
                 if other.startswith(prefix + _CLASS) and not of_it
             ]
             self._problems.add(
-                f"{self._lines[named_by][1]} is {shortened(detector)!r}: {name}_{_CLASS}"
-                f"{shortened(detector)} is missing{did_you_mean(detector, known)}",
+                f"{self._lines[named_by][1]} is {shorten(detector)!r}: {name}_{_CLASS}"
+                f"{shorten(detector)} is missing{did_you_mean(detector, known)}",
                 line=self._lines[named_by][0],
             )
             # Whichever of the two is misspelt, of its sizes there is nothing to say.
@@ -150,7 +150,7 @@ class AlerterKeys:
         wrong = text not in {CLASS_PREFIX + known for known in allowed}
         if wrong:
             self._problems.add(
-                f"{self._lines[key][1]} is {shortened(text, 80)!r}: it must be {CLASS_PREFIX} and "
+                f"{self._lines[key][1]} is {shorten(text, 80)!r}: it must be {CLASS_PREFIX} and "
                 f"one of {', '.join(allowed)}{did_you_mean(class_name, allowed)}",
                 line=number,
             )
@@ -206,7 +206,7 @@ class AlerterKeys:
             others = len(differs[resolution]) - 1
             more = f" and {others} more are" if others else " is"
             self._problems.add(
-                f"{shortened(differs[resolution][0], 3 * MOST_OF_A_CELL)}{more} not as in the "
+                f"{shorten(differs[resolution][0], 3 * MOST_OF_A_CELL)}{more} not as in the "
                 f"table of {which} advisories of TCAS II version 7.1, the only one that is used",
                 line=line,
             )
@@ -218,7 +218,7 @@ class AlerterKeys:
         self._expected[key] = shown
         if key not in self._lines:
             if needed:
-                self._problems.add(f"the key {shortened(shown)!r} is missing")
+                self._problems.add(f"the key {shorten(shown)!r} is missing")
             return None
         number, name, text = self._lines[key]
         self._used.add(key)
@@ -228,7 +228,7 @@ class AlerterKeys:
             self._problems.add(f"{name} {error}", line=number)
             return None
 
-    def _leave_out(self, named: tuple[str, ...]) -> None:
+    def _ignore_alerters(self, named: tuple[str, ...]) -> None:
         """Ignore the keys of whole alerters other than those with the prefixes `named`."""
         free = self._lines.keys() - self._used
         result: dict[str, str] = {}
@@ -244,7 +244,7 @@ class AlerterKeys:
             self._used |= {k for k in free if k.startswith(prefix) and not k.startswith(longer)}
         self.left_out = tuple(sorted(result.values()))
 
-    def _others(self, prefix: str) -> list[str]:
+    def _other_alerters(self, prefix: str) -> list[str]:
         """Return the names of what looks like alerters but those with a prefix."""
         found = {
             self._lines[key][1][: match.end(1)]
@@ -264,7 +264,7 @@ class AlerterKeys:
             if prefix not in self._misspelt:
                 number, shown, _ = self._lines[key]
                 self._problems.add(
-                    f"{shortened(shown, 3 * MOST_OF_A_CELL)}: no level of {shortened(name)} names "
+                    f"{shorten(shown, 3 * MOST_OF_A_CELL)}: no level of {shorten(name)} names "
                     "this detector",
                     line=number,
                 )
@@ -274,8 +274,8 @@ class AlerterKeys:
         strange = []
         for key in sorted(self._lines.keys() - self._used, key=lambda key: self._lines[key][0]):
             number, name, _ = self._lines[key]
-            shown = shortened(name, 3 * MOST_OF_A_CELL)
-            if hint := self._meant(key):
+            shown = shorten(name, 3 * MOST_OF_A_CELL)
+            if hint := self._nearest_key(key):
                 said = f"the key {shown!r} is unknown; did you mean {hint!r}?"
                 self._problems.add(said, line=number)
             else:
@@ -286,7 +286,7 @@ class AlerterKeys:
             names = ", ".join(f"{shown} (line {number})" for number, shown in strange)
             self._problems.add(f"{len(strange)} keys are unknown: {names}")
 
-    def _meant(self, key: str) -> str | None:
+    def _nearest_key(self, key: str) -> str | None:
         """Return the key that a misspelt one stands for, of those that the file lacks."""
         free = {k: shown for k, shown in self._expected.items() if k not in self._lines}
         for begin in sorted(self._beginnings, key=len, reverse=True):

@@ -16,8 +16,8 @@ from components.alert_configuration.conf_keys import (
 )
 from components.alert_configuration.configuration import Configuration
 from components.formats.text_rows import MOST_OF_A_CELL, Problems, read_lines
-from dsa_des.block.shipped_files import found_or_shipped
-from dsa_des.text.safe_text import shortened
+from dsa_des.block.shipped_files import resolve_shipped
+from dsa_des.text.safe_text import shorten
 
 #: A file of DAIDALUS 1 has one alerter, without a name, and says track and ground speed.
 _OF_RELEASE_1 = re.compile(
@@ -45,7 +45,7 @@ def read_conf(path: str | PathLike[str]) -> Configuration:
     TrafficFileError
         With all problems of the file: line, key, value, what is allowed.
     """
-    path = found_or_shipped(Path(path), str(path))
+    path = resolve_shipped(Path(path), str(path))
     problems = Problems(str(path), most=_MOST_PROBLEMS)
     lines = _lines(path, problems)
     _refuse_release_1(lines, path)
@@ -53,7 +53,7 @@ def read_conf(path: str | PathLike[str]) -> Configuration:
     keys = AlerterKeys(lines, problems)
     alerters = keys.alerters()
     _check_together(values, lines, problems)
-    problems.raise_if_any()
+    problems.raise_all()
     return Configuration(alerters, values, units, keys.left_out)
 
 
@@ -63,7 +63,7 @@ def _refuse_release_1(lines: Lines, path: Path) -> None:
     if old and "alerters" not in lines:
         problems = Problems(str(path))
         problems.fail(
-            f"this is a configuration of DAIDALUS 1 ({', '.join(map(shortened, old[:3]))} ...): "
+            f"this is a configuration of DAIDALUS 1 ({', '.join(map(shorten, old[:3]))} ...): "
             "files of release 2 are read, which name their alerters (alerters = ...) and begin the "
             "keys of each with its name; directions and speeds are hdir and hs there, trk and gs "
             "here"
@@ -86,11 +86,11 @@ def _lines(path: Path, problems: Problems) -> Lines:
         text = line.split("#", 1)[0].strip()
         key, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not key:
-            shown = shortened(text, MOST_OF_A_CELL)
+            shown = shorten(text, MOST_OF_A_CELL)
             problems.add(f"{shown!r} is not 'key = value [unit]'", line=number)
         elif key.lower() in result:
             first = result[key.lower()][0]
-            problems.add(f"{shortened(key)} stands in line {first} already", line=number)
+            problems.add(f"{shorten(key)} stands in line {first} already", line=number)
         else:
             result[key.lower()] = (number, key, value)
     return result
@@ -110,7 +110,7 @@ def _values(lines: Lines, problems: Problems) -> tuple[dict[str, Any], dict[str,
             continue
         if key in ONLY_OFF and value != default:
             problems.add(
-                f"{name} is {shortened(text, MOST_OF_A_CELL)}: only {str(default).lower()} is "
+                f"{name} is {shorten(text, MOST_OF_A_CELL)}: only {str(default).lower()} is "
                 "supported",
                 line=number,
             )

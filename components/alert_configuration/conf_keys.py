@@ -16,7 +16,7 @@ from components.formats.text_rows import (
     clean_token,
 )
 from dsa_des.errors import nearest
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 #: Units by kind of value, each with its factor to SI units (radians for angles).
 UNITS: Mapping[str, Mapping[str, float]] = {
@@ -150,14 +150,14 @@ def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, s
     """Return a value and the unit it is written in."""
     match = _VALUE.fullmatch(text.strip())
     if match is None:
-        raise BadValue(f"{shortened(text, 40)!r} is not a value with its unit in brackets")
+        raise BadValue(f"{shorten(text, 40)!r} is not a value with its unit in brackets")
     plain, unit = match.group(1).strip(), clean_token(match.group(2) or "")
     if not plain:
         raise BadValue("has no value")
     if kind in UNITS:
         return _quantity(kind, plain, unit, negative)
     if unit not in NO_UNIT:
-        raise BadValue(f"has the unit [{shortened(unit, 20)}]: it takes none")
+        raise BadValue(f"has the unit [{shorten(unit, 20)}]: it takes none")
     if kind == "name":
         return plain, ""
     if kind == "region":
@@ -169,14 +169,14 @@ def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, s
             hint = f"; did you mean {close}?" if close else ""
             allowed = " or ".join(VERSIONS)
             raise BadValue(
-                f"is {shortened(plain, 40)!r}: it must be {allowed}, whose rules are known, or a "
+                f"is {shorten(plain, 40)!r}: it must be {allowed}, whose rules are known, or a "
                 f"release between them{hint}"
             )
         return plain, ""
     if kind == "yes or no":
         result = {**_YES, **_NO}.get(plain.lower())
         if result is None:
-            raise BadValue(f"is {shortened(plain, 40)!r}: it must be true or false")
+            raise BadValue(f"is {shorten(plain, 40)!r}: it must be true or false")
         return result, ""
     value = _number(plain, negative)
     if kind == "count":
@@ -195,7 +195,7 @@ def _quantity(kind: str, plain: str, unit: str, negative: bool) -> tuple[float, 
     if unit not in factors:
         close = nearest(unit, factors)
         hint = f"; did you mean [{close}]?" if close else ""
-        raise BadValue(f"has the unit [{shortened(unit, 20)}]: it must be one of {shown}{hint}")
+        raise BadValue(f"has the unit [{shorten(unit, 20)}]: it must be one of {shown}{hint}")
     return value * factors[unit], unit
 
 
@@ -204,7 +204,7 @@ def _region(plain: str) -> str:
     if plain.upper() not in allowed:
         close = nearest(plain, allowed)
         hint = f"; did you mean {close!r}?" if close else ""
-        raise BadValue(f"is {shortened(plain, 40)!r}: it must be one of {', '.join(allowed)}{hint}")
+        raise BadValue(f"is {shorten(plain, 40)!r}: it must be one of {', '.join(allowed)}{hint}")
     return plain.upper()
 
 
@@ -214,9 +214,9 @@ def _number(plain: str, negative: bool) -> float:
             raise ValueError(plain)
         value = float(plain)
     except ValueError:
-        raise BadValue(f"is {shortened(plain, 40)!r}: a number is needed") from None
+        raise BadValue(f"is {shorten(plain, 40)!r}: a number is needed") from None
     if not math.isfinite(value):
-        raise BadValue(f"is {shortened(plain, 40)}: a finite number is needed")
+        raise BadValue(f"is {shorten(plain, 40)}: a finite number is needed")
     if value < 0.0 and not negative:
-        raise BadValue(f"is {shortened(plain, 40)}: it may not be negative")
+        raise BadValue(f"is {shorten(plain, 40)}: it may not be negative")
     return value

@@ -10,7 +10,7 @@ from components.well_clear.detection import Bounds
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 from dsa_des.arrays.types import FloatArray
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 #: Regions of guidance from mild to severe.
 REGIONS = ("NONE", "FAR", "MID", "NEAR", "RECOVERY")
@@ -63,7 +63,7 @@ class Configuration:
         """Say what of its file it does not use, or uses otherwise."""
         said = []
         if self.left_out:
-            shown = shortened(", ".join(self.left_out))
+            shown = shorten(", ".join(self.left_out))
             said.append(
                 f"alerters of the file that its key 'alerters' does not name are ignored: {shown}"
             )

@@ -36,12 +36,12 @@ def draw_alerts(
         _times(figure.add_subplot(grid[1, 0], sharex=over_time), encounter, alerts)
         bands = bands_over_time("hdir", configuration, encounter, alerts)
         _bands(figure.add_subplot(grid[2, 0], sharex=over_time), encounter, bands)
-        _from_above(figure.add_subplot(grid[:, 1]), configuration, encounter, alerts)
+        _draw_plan(figure.add_subplot(grid[:, 1]), configuration, encounter, alerts)
         figure.suptitle(figure_text(title))
         tight(figure)
 
 
-def _since(encounter: Encounter) -> Any:
+def _seconds_since_start(encounter: Encounter) -> Any:
     return encounter.time_s - encounter.time_s[0]
 
 
@@ -50,12 +50,12 @@ def _levels(axes: Any, configuration: Configuration, encounter: Encounter, alert
     for number, target in enumerate(encounter.targets):
         level = np.where(encounter.present[:, number], alerts.level[:, number], np.nan)
         name = figure_text(target) if number < _MOST_NAMED else None
-        axes.step(_since(encounter), level, where="post", linewidth=1.3, label=name)
+        axes.step(_seconds_since_start(encounter), level, where="post", linewidth=1.3, label=name)
     axes.set_yticks(range(configuration.most_levels + 1))
     axes.set_ylim(-0.2, configuration.most_levels + 0.2)
     axes.set_ylabel("alert level")
     axes.set_title("alert level", loc="left")
-    _legend_above(axes)
+    _put_legend_above(axes)
 
 
 def _times(axes: Any, encounter: Encounter, alerts: Alerts) -> None:
@@ -65,7 +65,7 @@ def _times(axes: Any, encounter: Encounter, alerts: Alerts) -> None:
     )
     for number in range(least.shape[1]):
         axes.plot(
-            _since(encounter),
+            _seconds_since_start(encounter),
             np.where(np.isfinite(least[:, number]), least[:, number], np.nan),
             color=_colour(number + 1),
             linestyle=_STYLES[number % len(_STYLES)],
@@ -75,7 +75,7 @@ def _times(axes: Any, encounter: Encounter, alerts: Alerts) -> None:
     axes.set_ylabel("time to violation, s")
     axes.set_title("time to each level's volume", loc="left")
     axes.set_ylim(bottom=0.0)
-    _legend_above(axes)
+    _put_legend_above(axes)
 
 
 def _bands(axes: Any, encounter: Encounter, found: BandsOverTime) -> None:
@@ -103,7 +103,7 @@ def _bands(axes: Any, encounter: Encounter, found: BandsOverTime) -> None:
     axes.set_ylabel("direction, deg")
     axes.set_xlabel(f"time since {encounter.time_s[0]:.10g} s, s")
     axes.set_title("bands of direction", loc="left")
-    _legend_above(axes)
+    _put_legend_above(axes)
 
 
 def _fill(axes: Any, corners: list[Any], colour: str, label: str) -> None:
@@ -117,7 +117,7 @@ def _fill(axes: Any, corners: list[Any], colour: str, label: str) -> None:
     )
 
 
-def _legend_above(axes: Any) -> None:
+def _put_legend_above(axes: Any) -> None:
     """Put the legend above the axes, at the right: it covers nothing that is drawn."""
     handles, _ = axes.get_legend_handles_labels()
     if handles:
@@ -127,7 +127,7 @@ def _legend_above(axes: Any) -> None:
         )  # fmt: skip
 
 
-def _from_above(
+def _draw_plan(
     axes: Any, configuration: Configuration, encounter: Encounter, alerts: Alerts
 ) -> None:
     """Draw the flights in the plane of the first sample, the ownship coloured by its alerts."""

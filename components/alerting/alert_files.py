@@ -15,12 +15,12 @@ from components.alerting.encounter import Encounter, read_encounter
 from components.alerting.levels import Alerts, alert_levels
 from components.formats.recorded.traffic_of_files import TrafficChoice
 from components.formats.text_rows import SPEED_MPS, TrafficFileError
-from dsa_des.block.shipped_files import found_or_shipped
+from dsa_des.block.shipped_files import resolve_shipped
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
 from dsa_des.files.output_file import PICTURES, check_ending, check_file, write_file
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.files.output_names import named, reason_of
+from dsa_des.files.output_names import reason_of, user_path
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
 
@@ -49,9 +49,9 @@ def alert_files(
     decimals: int,
 ) -> None:
     """Write the tables and figures that the command line asks for."""
-    paths, several = _found(encounters)
+    paths, several = _list_encounter_files(encounters)
     names = {"--out": out, "--figure": figure, "--bands": bands}
-    places = {option: named(name, option) for option, name in names.items() if name is not None}
+    places = {option: user_path(name, option) for option, name in names.items() if name is not None}
     for (option, path), (other, its) in combinations(places.items(), 2):
         if path.resolve() == its.resolve():
             raise UsageError(f"{other} and {option} name the same place: each needs its own")
@@ -62,7 +62,7 @@ def alert_files(
             if option == "--figure":
                 check_ending(path, PICTURES, option)
             check_file(path, option)
-    configuration = _read(Path(conf))
+    configuration = _read_configuration(Path(conf))
     if no_hysteresis:
         configuration = without_memory(configuration)
     own = None if own_file is None else Path(own_file)
@@ -81,13 +81,13 @@ def alert_files(
     _show(configuration, done, places)
 
 
-def _found(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
+def _list_encounter_files(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
     """Return the files that are named, those of folders sorted, and whether they may be several."""
     result: list[Path] = []
     several = len(encounters) > 1
     for text in encounters:
         try:
-            path = found_or_shipped(resolve_home(text), text)
+            path = resolve_shipped(resolve_home(text), text)
         except InputFileError as error:
             raise UsageError(f"{text}: {error}") from error
         if not is_folder(path):
@@ -106,7 +106,7 @@ def _found(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
     return result, several
 
 
-def _read(path: Path) -> Configuration:
+def _read_configuration(path: Path) -> Configuration:
     try:
         return read_conf(path)
     except TrafficFileError as error:

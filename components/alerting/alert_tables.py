@@ -15,7 +15,7 @@ from components.guidance.kinds import KINDS
 from components.guidance.memory import GuidanceMemory
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
-from components.well_clear.detection import some_bounds
+from components.well_clear.detection import select_bounds
 from components.well_clear.separation import separation
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
@@ -39,7 +39,7 @@ _SEPARATION = (
 
 
 def without_memory(configuration: Configuration) -> Configuration:
-    """Return a configuration in which every row stands by itself."""
+    """Return a configuration without hysteresis, so that every row is judged independently."""
     values = dict(configuration.values)
     values.update(hysteresis_time=0.0, persistence_time=0.0, alerting_m=0, alerting_n=0)
     return replace(configuration, values=values)
@@ -50,7 +50,7 @@ def alert_table(
 ) -> str:
     """Return the table of an encounter as comma-separated text with two rows of headings."""
     units = _units(configuration)
-    shown = _shown(configuration)
+    shown = _separation_columns(configuration)
     names = ["Time", "Ownship", "Traffic", "Alerter", "Alert Level"]
     heading_units = ["[s]", "", "", "", ""]
     for number in range(1, configuration.most_levels + 1):
@@ -79,7 +79,7 @@ def _units(configuration: Configuration) -> dict[str, tuple[str, float]]:
     return result
 
 
-def _shown(configuration: Configuration) -> tuple[tuple[str, str, str], ...]:
+def _separation_columns(configuration: Configuration) -> tuple[tuple[str, str, str], ...]:
     """Return the columns of separation: without modified tau where the first alerter has none."""
     first = configuration.corrective_level(configuration.alerters[0])
     advisory = first is not None and isinstance(first.volume, TcasAdvisory)
@@ -113,7 +113,7 @@ def _rows(
     for number in range(configuration.most_levels):
         texts.append(number_texts(alerts.violation_s[cells][:, number], decimals))
     units = _units(configuration)
-    for _, key, kind in _shown(configuration):
+    for _, key, kind in _separation_columns(configuration):
         texts.append(number_texts(result[key] / units[kind][1], decimals))
     return [", ".join(parts) for parts in zip(*texts, strict=True)]
 
@@ -168,7 +168,7 @@ def bands_over_time(
             there = encounter.present[:, target] & (encounter.alerter[:, target] == number)
             if there.any():
                 early = alerts.early_level[:, target]
-                bounds = some_bounds(pairs.bounds, (slice(None), target))
+                bounds = select_bounds(pairs.bounds, (slice(None), target))
                 intruders.append(GuidedIntruders(state, alerter, early, there, bounds))
     memory = GuidanceMemory(configuration, kind_name)
     result = guidance_of_many(kind_name, configuration, own, intruders)

@@ -45,19 +45,19 @@ class BelievedPositions:
     def __init__(self, keep_s: float, targets: int) -> None:
         self._keep_s, self._targets = keep_s, targets
         #: East, north, up (targets, 3, n); NaN where a target was not seen.
-        self._seen = ReceivedRows.none(time_s=(), position_m=(targets, 3))
+        self._seen = ReceivedRows.without_rows(time_s=(), position_m=(targets, 3))
         #: How many, of how many, by run: sights without a range, and targets there without a
         #: velocity.
         self._rangeless, self._unmoving = np.zeros((2, 2, 0), dtype=np.int64)
 
     def undone(self) -> dict[str, IntArray]:
         """Return how often something could not be judged, by run."""
-        return judged_not(self._rangeless, self._unmoving)
+        return count_not_judged(self._rangeless, self._unmoving)
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
         """Take in positions (n, targets, 3) at instants of their run, and when they came."""
         position = np.moveaxis(position_m, 0, -1)
-        self._seen = self._seen.with_more(came, time_s=time_s, position_m=position)
+        self._seen = self._seen.append(came, time_s=time_s, position_m=position)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
         """Take in what was measured in body axes, by the attitude of when it was measured."""
@@ -132,7 +132,7 @@ class BelievedPositions:
                 continue
             lines = line[start[alike] + np.arange(count)[:, np.newaxis]]
             position = np.moveaxis(self._seen.position_m[:, :, lines], (0, 1), (2, 3))
-            known[alike], state[:, alike] = _fitted(
+            known[alike], state[:, alike] = _fit_lines(
                 time_s[lines], np.ascontiguousarray(position), now_s[alike]
             )
         if not known.all() and len(time_s):
@@ -153,7 +153,7 @@ class BelievedPositions:
         of, target = slow.nonzero()
         lines = np.array([before[of, target], last[of, target]])
         position = self._seen.position_m[target, :, lines][:, :, np.newaxis]
-        found = _fitted(time_s[lines], position, now_s[scans[of]])
+        found = _fit_lines(time_s[lines], position, now_s[scans[of]])
         known[scans[of], target] = found[0][:, 0]
         state[:, scans[of], target] = found[1][:, :, 0]
         there = (last >= 0) & (now_s[scans, np.newaxis] - time_s[last] <= self._keep_s)
@@ -187,7 +187,7 @@ class BelievedPositions:
             before = np.where(alike, earlier(before - 1), before)
 
 
-def judged_not(rangeless: IntArray, unmoving: IntArray) -> dict[str, IntArray]:
+def count_not_judged(rangeless: IntArray, unmoving: IntArray) -> dict[str, IntArray]:
     """Return in words how often something could not be judged, and why, by run."""
     lacks = {
         "what it hears of has no range and is not judged": rangeless,
@@ -223,7 +223,7 @@ def _by_instant(
     return line.reshape(-1)[: len(row)], pairs[0], pairs[1]
 
 
-def _fitted(
+def _fit_lines(
     time_s: FloatArray, position_m: FloatArray, now_s: FloatArray
 ) -> tuple[BoolArray, FloatArray]:
     """Return the states at some instants of least-squares lines through positions."""

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from components.alert_configuration.configuration import Deviations, largest
-from components.alerting.believed_positions import BelievedFlights, judged_not
+from components.alerting.believed_positions import BelievedFlights, count_not_judged
 from components.alerting.others_tracks import OthersTracks
 from components.alerting.received import OwnPoses, ReceivedRows
 from components.estimation.frame import vectors_in_frame
@@ -45,7 +45,7 @@ class EstimatedFlights:
         #: How many tracks have no range, of how many, by run.
         self.rangeless = np.zeros((2, 0), dtype=np.int64)
         #: Where the tracks of each row begin and how many there are.
-        self._rows = ReceivedRows.none("begin", "count")
+        self._rows = ReceivedRows.without_rows("begin", "count")
         #: Tracks, in no order: states (6, n) and covariances (21, n) in frames with an origin (3,
         #: n) of latitude, longitude (deg) and height (m), of the instant ``time_s``.
         self._tracks = KeyedTable.empty(
@@ -68,7 +68,7 @@ class EstimatedFlights:
         good &= tracks.has_range
         before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
         begin = len(self._tracks) + before[:-1]
-        self._rows = self._rows.with_more(came, begin=begin, count=np.diff(before))
+        self._rows = self._rows.append(came, begin=begin, count=np.diff(before))
         new = KeyedTable(
             replica=run,
             number=tracks.track,
@@ -81,18 +81,18 @@ class EstimatedFlights:
             covariance=np.array([tracks.covariance[COVARIANCE[pair]] for pair in _PAIRS]),
             origin=np.array([getattr(tracks, name) for name in ORIGIN]),
         )
-        self._tracks = KeyedTable.joined([self._tracks, new.take(good)])
+        self._tracks = KeyedTable.concatenate([self._tracks, new.take(good)])
 
     def keep(self, which: BoolArray) -> None:
         """Keep some of the rows that came."""
         if which.all():
             return
         rows = self._rows.take(which)
-        self._tracks = self._tracks.take(_each(rows.begin, rows.count)[1])
+        self._tracks = self._tracks.take(_enumerate_entries(rows.begin, rows.count)[1])
         self._rows = rows.with_columns(begin=np.cumsum(rows.count) - rows.count)
 
     @property
-    def came(self) -> RunTicks:
+    def arrival_ticks(self) -> RunTicks:
         """When the rows that are remembered came."""
         return self._rows.instants
 
@@ -111,14 +111,14 @@ class EstimatedFlights:
         last = self._rows.last(now)
         some = np.flatnonzero(last >= 0)
         rows = self._rows.take(last[some])
-        index, entry = _each(rows.begin, rows.count)
+        index, entry = _enumerate_entries(rows.begin, rows.count)
         instant = some[index]
         young = now_s[instant] - self._tracks.updated_s[entry] <= STALE_S
         instant, entry = instant[young], entry[young]
         order = np.lexsort((self._tracks.number[entry], instant))
         instant, tracks = instant[order], self._tracks.take(entry[order])
         ahead_s = now_s[instant] - tracks.time_s
-        state = _in_plane(tracks, ahead_s, own_place[:, instant])
+        state = _project_to_plane(tracks, ahead_s, own_place[:, instant])
         deviations = _deviations(tracks.covariance, ahead_s)
         age_s = now_s[instant] - tracks.updated_s
         given = np.flatnonzero(tracks.from_others)
@@ -135,14 +135,14 @@ class EstimatedFlights:
         return instant[kept], tracks.number[kept], state[:, kept], deviations, age_s[kept]
 
 
-def _each(begin: IntArray, count: IntArray) -> tuple[IntArray, IntArray]:
+def _enumerate_entries(begin: IntArray, count: IntArray) -> tuple[IntArray, IntArray]:
     """Return the row of every entry of some rows, and its place."""
     row = np.repeat(np.arange(len(count)), count)
     first = np.cumsum(count) - count
     return row, np.arange(len(row)) + (begin - first)[row]
 
 
-def _in_plane(tracks: KeyedTable, ahead_s: FloatArray, own_place: FloatArray) -> FloatArray:
+def _project_to_plane(tracks: KeyedTable, ahead_s: FloatArray, own_place: FloatArray) -> FloatArray:
     """Return places and velocities in the plane that touches the sphere below the ownship."""
     north, east, down = tracks.state[:3] + tracks.state[3:] * ahead_s
     lat_deg, lon_deg, alt_m = enu_to_geodetic(
@@ -191,13 +191,13 @@ class BelievedTracks:
     def __init__(self, targets: int, others: OthersTracks) -> None:
         self._estimates = EstimatedFlights(others)
         #: Where the targets are: a track is named by the nearest.
-        self._true = ReceivedRows.none(position_m=(targets, 3))
+        self._true = ReceivedRows.without_rows(position_m=(targets, 3))
         #: At how many scans the ownship's velocity is not known yet, of how many, by run.
         self._unmoving = np.zeros((2, 0), dtype=np.int64)
 
     def undone(self) -> dict[str, IntArray]:
         """Return how often something could not be judged, by run."""
-        return judged_not(self._estimates.rangeless, self._unmoving)
+        return count_not_judged(self._estimates.rangeless, self._unmoving)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
         """Take in the tracks of a tracker."""
@@ -205,7 +205,7 @@ class BelievedTracks:
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
         """Take in where the targets are (rows, targets, 3)."""
-        self._true = self._true.with_more(came, position_m=np.moveaxis(position_m, 0, -1))
+        self._true = self._true.append(came, position_m=np.moveaxis(position_m, 0, -1))
 
     def flights(
         self,
@@ -246,11 +246,11 @@ class BelievedTracks:
 
     def forget(self, asked: RunTicks, times_s: FloatArray, wake: Wake) -> None:
         """Drop what later ones have replaced at some scans."""
-        self._estimates.keep(_still_asked(self._estimates.came, asked, wake))
-        self._true = self._true.take(_still_asked(self._true.instants, asked, wake))
+        self._estimates.keep(_asked_later(self._estimates.arrival_ticks, asked, wake))
+        self._true = self._true.take(_asked_later(self._true.instants, asked, wake))
 
 
-def _still_asked(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
+def _asked_later(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
     """Return which rows are asked for after some scans: the last before them, and later ones."""
     ends = asked.take(asked.last_of_each)
     last = last_of_run(came, ends)

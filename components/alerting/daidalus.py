@@ -165,7 +165,7 @@ class DaidalusAlerting(Component):
                 self._belief.add(arrived, self._own, wake)
         asked = wake.instants.take(wake.scans >= 0)
         # Before the first state of a run has come, it has no levels.
-        asked = asked.take(self._own.have_come(asked))
+        asked = asked.take(self._own.has_come(asked))
         return self._levels(asked, wake) if len(asked) else None
 
     def _take_states(self, arrived: Arrivals, wake: Wake) -> None:
@@ -195,7 +195,7 @@ class DaidalusAlerting(Component):
         wrong = flights.deviations and Deviations(*(part[row] for part in flights.deviations))
         bounds = wrong and margins(self._configuration, wrong, np.hypot(*relative[:2]))
         scan = np.arange(len(asked)) if flights.scan is None else flights.scan
-        pairs = AlertPairs(relative, _own_flights(own, scan[row]), bounds)
+        pairs = AlertPairs(relative, _ownship_flights(own, scan[row]), bounds)
         times_s, *now_due = levels_without_memory(self._configuration, self._alerter, pairs)
         # Memory is asked of all, also of those that are not known now.
         columns = known.shape[1]
@@ -225,7 +225,7 @@ class DaidalusAlerting(Component):
             result.time_to_closest_s,
             result.miss_horizontal_m,
             result.miss_vertical_m,
-            _of_tracks(flights),
+            _track_columns(flights),
             {} if wrong is None else wrong._asdict(),
             dict(zip(_RELATIVE, relative, strict=True)),
             own,
@@ -244,14 +244,14 @@ class DaidalusAlerting(Component):
         self._own.set_aside(since, wake, late_sights=self._source != "estimates")
 
 
-def _of_tracks(flights: BelievedFlights) -> dict[str, AnyArray]:
+def _track_columns(flights: BelievedFlights) -> dict[str, AnyArray]:
     """Return what is recorded of the tracks that are believed; nothing where there are none."""
     if flights.number is None or flights.age_s is None:
         return {}
     return {"track": flights.number, "track_age_s": flights.age_s}
 
 
-def _own_flights(own: Mapping[str, FloatArray], scan: IntArray) -> State:
+def _ownship_flights(own: Mapping[str, FloatArray], scan: IntArray) -> State:
     """Return the ownship's flight at some scans, in its own plane."""
     motion = np.array([own[name][scan] for name in _OWN_MOTION])
     motion[np.isnan(motion)] = 0.0

@@ -19,7 +19,7 @@ from components.guidance.situation import State
 from components.well_clear.detection import Bounds
 from components.well_clear.volume import Relative
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 Samples = dict[str, FloatArray]
 
@@ -85,7 +85,7 @@ def read_encounter(
         for key, part in zip(("ve", "vn"), wind, strict=True):
             aircraft[key] = aircraft[key] - np.interp(aircraft["time"], own["time"], part)
     others = [samples[name] for name in names[1:]]
-    index, present = _at_once(own["time"], others)
+    index, present = _simultaneous_samples(own["time"], others)
     targets = {key: _gather([o[key] for o in others], index) for key in own}
     flat = "sx" in own
     state = _flat_states if flat else _projected_states
@@ -119,26 +119,26 @@ def _samples(
     own = file.ownship
     time_s = own.sample_times_s
     time_s = time_s[time_s >= 0.0]
-    result, far = {own.name: _sampled(own, time_s, file.start_time_s)}, []
+    result, far = {own.name: _sample_flight(own, time_s, file.start_time_s)}, []
     for craft in file.intruders:
         there = time_s[craft.at(time_s).present]
         if len(there):
-            result[craft.name] = _sampled(craft, there, file.start_time_s)
+            result[craft.name] = _sample_flight(craft, there, file.start_time_s)
         else:
             far.append(craft.name)
     if len(result) < 2:
         Problems(str(path)).fail(
             f"no aircraft is there at a time at which {own.name} is" if file.intruders else
-            f"there is one aircraft only, {shortened(own.name)!r}: an ownship and at least one "
+            f"there is one aircraft only, {shorten(own.name)!r}: an ownship and at least one "
             "intruder are needed"
         )  # fmt: skip
     notes = [*file.notes, "flights are interpolated to the times of the ownship"]
     if far:
-        notes.append(f"never there at a time of the ownship: {shortened(', '.join(far))}")
+        notes.append(f"never there at a time of the ownship: {shorten(', '.join(far))}")
     return result, tuple(notes)
 
 
-def _sampled(craft: SampledTrajectory, time_s: FloatArray, start_s: float) -> Samples:
+def _sample_flight(craft: SampledTrajectory, time_s: FloatArray, start_s: float) -> Samples:
     """Return the samples of an aircraft at some times of its flight."""
     known_s, path = craft.sample_times_s, (craft.lat_deg, craft.lon_deg, craft.alt_m)
     velocity = craft.velocity_enu_mps
@@ -165,7 +165,7 @@ def _wind(own: Samples, wind_mps: tuple[float, float] | None) -> FloatArray:
     return np.asarray(np.stack([own["ve"], own["vn"]]) - through_air)
 
 
-def _at_once(own_s: FloatArray, others: list[Samples]) -> tuple[IntArray, BoolArray]:
+def _simultaneous_samples(own_s: FloatArray, others: list[Samples]) -> tuple[IntArray, BoolArray]:
     """Return each target's sample at each of the ownship's times, and whether there is one."""
     index = np.stack([np.searchsorted(o["time"], own_s) for o in others], axis=1)
     index = np.minimum(index, np.array([len(other["time"]) - 1 for other in others]))

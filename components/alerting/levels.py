@@ -8,8 +8,8 @@ from components.alert_configuration.configuration import Alerter, Configuration,
 from components.alerting.memory import AlertMemory, MemoryRule
 from components.guidance.kinds import kind_of
 from components.guidance.situation import Detector, State
-from components.well_clear.detection import Bounds, detection_span, some_bounds
-from components.well_clear.relative_motion import surely_less
+from components.well_clear.detection import Bounds, detection_span, select_bounds
+from components.well_clear.relative_motion import is_surely_less
 from components.well_clear.volume import Relative
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -17,7 +17,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 _MOST_SPREAD_AT_ONCE = 64
 
 
-def due_by_spread(
+def levels_due_by_spread(
     configuration: Configuration,
     levels: tuple[Level, ...],
     own: State,
@@ -31,13 +31,13 @@ def due_by_spread(
         part = slice(start, start + _MOST_SPREAD_AT_ONCE)
         mine, theirs = own.rows(part), intruder.rows(part)
         for number, level in enumerate(levels):
-            of_part = some_bounds(bounds, part) if level.uncertain else None
+            of_part = select_bounds(bounds, part) if level.uncertain else None
             detector = Detector(
-                level.volume, bounds=some_bounds(of_part, (slice(None), np.newaxis))
+                level.volume, bounds=select_bounds(of_part, (slice(None), np.newaxis))
             )
             for kind_name, spread in level.spreads:
                 kind = kind_of(kind_name, mine, configuration)
-                conflicts = kind.against(theirs.columns(), detector)
+                conflicts = kind.find_conflicts(theirs.columns(), detector)
                 middle = kind.own_value[:, np.newaxis]
                 low, high = kind.values[:, :-1] - middle, kind.values[:, 1:] - middle
                 near = (low < spread) & (high > -spread) & kind.there[:, :-1] & kind.there[:, 1:]
@@ -96,7 +96,7 @@ def violation_times_s(
                 vertical = (
                     None if own_up_mps is None else (own_up_mps[0][part], own_up_mps[1][part])
                 )
-                of_part = some_bounds(bounds, part) if level.uncertain else None
+                of_part = select_bounds(bounds, part) if level.uncertain else None
                 known[key] = detection_span(
                     level.volume, states, vertical, of_part, 0.0, lookahead_s
                 ).begin_s
@@ -109,7 +109,9 @@ def due_levels(levels: tuple[Level, ...], violation_s: FloatArray) -> tuple[Bool
     ordinary = np.array([level.alerting_time_s for level in levels])
     early = np.array([level.early_alerting_time_s for level in levels])
     inside = violation_s == 0.0
-    return inside | surely_less(violation_s, ordinary), inside | surely_less(violation_s, early)
+    return inside | is_surely_less(violation_s, ordinary), inside | is_surely_less(
+        violation_s, early
+    )
 
 
 class AlertPairs(NamedTuple):
@@ -122,11 +124,11 @@ class AlertPairs(NamedTuple):
     own: State | None = None
     bounds: Bounds | None = None  # (n,) or None: how far the relative states may be wrong
 
-    def some(self, which: Any) -> "AlertPairs":
+    def select(self, which: Any) -> "AlertPairs":
         """Return some of the pairs."""
         own = None if self.own is None else self.own.rows(which)
         relative = tuple(part[which] for part in self.relative)
-        return AlertPairs(relative, own, some_bounds(self.bounds, which))
+        return AlertPairs(relative, own, select_bounds(self.bounds, which))
 
 
 def levels_without_memory(
@@ -144,7 +146,7 @@ def levels_without_memory(
     due, early = due_levels(levels, result)
     if own is not None and any(level.spreads for level in levels):
         intruder = State(*(mine - part for mine, part in zip(own, pairs.relative, strict=True)))
-        by_spread = due_by_spread(configuration, levels, own, intruder, pairs.bounds)
+        by_spread = levels_due_by_spread(configuration, levels, own, intruder, pairs.bounds)
         due, early = due | by_spread[0], early | by_spread[1]
     return result, due, early
 
@@ -173,7 +175,7 @@ def alert_levels(
     for number, one in enumerate(configuration.alerters):
         cells = np.nonzero((which == number) & present)
         if len(cells[0]) and one.levels:
-            result = levels_without_memory(configuration, one, pairs.some(cells))
+            result = levels_without_memory(configuration, one, pairs.select(cells))
             count = len(one.levels)
             for whole, part in zip((violation_s, due, early), result, strict=True):
                 whole[cells[0], cells[1], :count] = part

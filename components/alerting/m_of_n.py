@@ -52,7 +52,7 @@ class MOfNAlerts(Component):
         self._memory = LevelMemory(MemoryRule(self.p.forget_s, self.p.hold_s, self.p.m, self.p.n))
 
     def offer(self, port: str) -> AlertsOffered | None:
-        """Pass on what is said of the unfiltered alerts."""
+        """Pass on the offer of the unfiltered alerts."""
         return next((p.offer for p in self.context.producers), None)
 
     def warnings(self) -> list[str]:

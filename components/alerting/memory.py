@@ -136,7 +136,7 @@ class LevelMemory:
             part, level[rows] = self._known.take(index[rows]).step(
                 self._rule, now_s[rows], present[rows], due[rows], early[rows]
             )
-            self._put(index[rows], part)
+            self._store(index[rows], part)
         return level
 
     def forget(self, runs: IntArray, times_s: FloatArray) -> None:
@@ -150,7 +150,7 @@ class LevelMemory:
         """Forget the runs before one."""
         self._known = self._known.take(self._known.replica >= run)
 
-    def _put(self, which: IntArray, part: AlertMemory) -> None:
+    def _store(self, which: IntArray, part: AlertMemory) -> None:
         for name, values in part.columns.items():
             self._known.columns[name][..., which] = values
 
@@ -164,5 +164,5 @@ class LevelMemory:
         every = union([known, those if order is None else those.take(order)])
         old, before = last_of_run(every, known), self._known
         self._known = AlertMemory.new(self._rule, every.run.copy(), every.tick.copy())
-        self._put(old, before)
+        self._store(old, before)
         return last_of_run(every, those)

@@ -16,7 +16,7 @@ class ReceivedRows(KeyedTable):
     """Rows that have come: those of each run (``replica``) together, by when they ``came``."""
 
     @classmethod
-    def none(cls, *whole: str, **shapes: tuple[int, ...]) -> Self:
+    def without_rows(cls, *whole: str, **shapes: tuple[int, ...]) -> Self:
         """Return no rows, of columns of whole numbers, and of floats (with what shape)."""
         columns = dict.fromkeys(("replica", "came", *whole), int)
         return cls.empty({**columns, **dict.fromkeys(shapes, float)}, shapes)
@@ -26,10 +26,10 @@ class ReceivedRows(KeyedTable):
         """When each came."""
         return RunTicks(self.replica, self.came)
 
-    def with_more(self, came: RunTicks, **columns: Any) -> Self:
+    def append(self, came: RunTicks, **columns: Any) -> Self:
         """Return them with rows that came later, or in other runs."""
         new = type(self)(replica=came.run, came=came.tick, **columns)
-        every = self.joined([self, new])
+        every = self.concatenate([self, new])
         order = every.instants.order()
         return every if order is None else every.take(order)
 
@@ -43,12 +43,12 @@ class OwnPoses:
 
     def __init__(self, ticks_per_s: int) -> None:
         self._per_s = ticks_per_s
-        self._poses = ReceivedRows.none("tick", place=(3,), attitude=(3,))
+        self._poses = ReceivedRows.without_rows("tick", place=(3,), attitude=(3,))
         #: Poses that were set aside.
         self._old: list[ReceivedRows] = []
 
     @property
-    def _made(self) -> RunTicks:
+    def _made_ticks(self) -> RunTicks:
         return RunTicks(self._poses.replica, self._poses.tick)
 
     def add(self, came: RunTicks, states: TrafficStates) -> None:
@@ -56,7 +56,7 @@ class OwnPoses:
         position = np.radians(states.own_lat_deg), np.radians(states.own_lon_deg), states.own_alt_m
         angles = states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad
         self._keep(
-            self._poses.with_more(
+            self._poses.append(
                 came, tick=states.tick, place=np.array(position), attitude=np.array(angles)
             )
         )
@@ -66,16 +66,16 @@ class OwnPoses:
         newest = RunTicks(poses.replica, poses.tick).newest()
         self._poses = poses.take(poses.tick >= newest.tick)
 
-    def have_come(self, asked: RunTicks) -> BoolArray:
+    def has_come(self, asked: RunTicks) -> BoolArray:
         """Return whether any has come by some instants."""
         return np.asarray(self._poses.last(asked) >= 0)
 
     def pose_of(self, measured: RunTicks, came: RunTicks, asked: BoolArray) -> IntArray:
         """Return the pose of when something was measured, of those that had come; -1 for none."""
-        index = np.minimum(last_of_run(self._made, measured), self._poses.last(came))
+        index = np.minimum(last_of_run(self._made_ticks, measured), self._poses.last(came))
         first = first_of_run(self._poses.instants, came.run)
         if self._old and bool((asked & (index <= first)).any()):
-            every = ReceivedRows.joined([*self._old, self._poses])
+            every = ReceivedRows.concatenate([*self._old, self._poses])
             order = every.instants.order()
             self._keep(every if order is None else every.take(order))
             self._old = []
@@ -94,7 +94,7 @@ class OwnPoses:
         """Return the altitude, and the mean velocity over the last seconds, at some instants."""
         earliest = first_of_run(self._poses.instants, asked.run)
         last = np.maximum(self._poses.last(asked), earliest)
-        first = next_of_run(self._made, asked.later(-round(over_s * self._per_s)))
+        first = next_of_run(self._made_ticks, asked.later(-round(over_s * self._per_s)))
         first = np.maximum(np.minimum(first, last - 1), earliest)
         now, then = self._poses.place[:, last], self._poses.place[:, first]
         time_s = (self._poses.tick[last] - self._poses.tick[first]) / self._per_s

@@ -31,7 +31,7 @@ HIGHEST_ALTITUDE_M = 1e9
 LOWEST_ALTITUDE_M = -6e6
 
 
-def as_numbers(name: str, value: ArrayLike) -> FloatArray:
+def check_numbers(name: str, value: ArrayLike) -> FloatArray:
     """Return `value` as a float64 array, or say that it is not a number."""
     try:
         return np.asarray(value, dtype=np.float64)
@@ -53,21 +53,21 @@ def refuse(name: str, array: FloatArray, bad: NDArray[np.bool_], rule: str) -> N
 
 def positive(name: str, value: ArrayLike) -> FloatArray:
     """Return `value` as float64, all of it finite and above 0."""
-    array = as_numbers(name, value)
+    array = check_numbers(name, value)
     refuse(name, array, ~((array > 0.0) & np.isfinite(array)), "be finite and above 0")
     return array
 
 
-def not_negative(name: str, value: ArrayLike) -> FloatArray:
+def check_not_negative(name: str, value: ArrayLike) -> FloatArray:
     """Return `value` as float64, all of it finite and 0 or more."""
-    array = as_numbers(name, value)
+    array = check_numbers(name, value)
     refuse(name, array, ~((array >= 0.0) & np.isfinite(array)), "be finite and 0 or more")
     return array
 
 
 def finite(name: str, value: ArrayLike) -> FloatArray:
     """Return `value` as float64, all of it finite, of any size; see also `squarable`."""
-    array = as_numbers(name, value)
+    array = check_numbers(name, value)
     refuse(name, array, ~np.isfinite(array), "be finite")
     return array
 
@@ -119,9 +119,9 @@ def angle(name: str, value: ArrayLike) -> FloatArray:
     return array
 
 
-def checked_frequency(frequency_hz: ArrayLike, highest_hz: float) -> FloatArray:
+def check_frequency(frequency_hz: ArrayLike, highest_hz: float) -> FloatArray:
     """Return the frequency in GHz, from 1 GHz to the highest a Recommendation covers."""
-    frequency = as_numbers("frequency_hz", frequency_hz)
+    frequency = check_numbers("frequency_hz", frequency_hz)
     refuse(
         "frequency_hz",
         frequency,
@@ -131,38 +131,38 @@ def checked_frequency(frequency_hz: ArrayLike, highest_hz: float) -> FloatArray:
     return frequency * 1e-9
 
 
-def within(name: str, value: ArrayLike, low: float, high: float, unit: str) -> FloatArray:
+def check_within(name: str, value: ArrayLike, low: float, high: float, unit: str) -> FloatArray:
     """Return `value` as float64, all of it in [low, high]."""
-    array = as_numbers(name, value)
+    array = check_numbers(name, value)
     refuse(name, array, ~((array >= low) & (array <= high)), f"lie in [{low:g}, {high:g}] {unit}")
     return array
 
 
-def checked_snr(value: ArrayLike) -> FloatArray:
+def check_snr(value: ArrayLike) -> FloatArray:
     """Return the SNR as float64, 0 to infinity."""
-    array = as_numbers("snr", value)
+    array = check_numbers("snr", value)
     # min() carries a NaN along, and every comparison with NaN is false.
     if array.size and not array.min() >= 0.0:
         refuse("snr", array, ~(array >= 0.0), "be a power ratio of 0 or more (linear, not dB)")
     return array
 
 
-def checked_pulses(value: ArrayLike) -> FloatArray:
+def check_pulses(value: ArrayLike) -> FloatArray:
     """Return the number of pulses as float64 holding whole numbers from 1 to `MAX_PULSES`."""
     if type(value) is int and 1 <= value <= MAX_PULSES:  # the usual case, without NumPy's calls
         return np.array(float(value))
-    array = as_numbers("pulses", value)
+    array = check_numbers("pulses", value)
     with np.errstate(invalid="ignore"):  # floor of NaN or infinity; refused here
         bad = ~((array >= 1.0) & (array <= MAX_PULSES) & (np.floor(array) == array))
     refuse("pulses", array, bad, f"be a whole number from 1 to {MAX_PULSES}")
     return array
 
 
-def checked_probability(name: str, value: ArrayLike) -> FloatArray:
+def check_probability(name: str, value: ArrayLike) -> FloatArray:
     """Return a probability as float64, strictly between 0 and 1."""
     if type(value) is float and 0.0 < value < 1.0:  # the usual case, without NumPy's calls
         return np.array(value)
-    array = as_numbers(name, value)
+    array = check_numbers(name, value)
     refuse(name, array, ~((array > 0.0) & (array < 1.0)), "lie strictly between 0 and 1")
     return array
 
@@ -178,7 +178,7 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     )
 
 
-def checked_model(value: object) -> str:
+def check_model(value: object) -> str:
     """Return the canonical name of a Swerling model; swerling5 is another name of swerling0."""
     name = one_of("model", value, (*MODELS, *_ALIASES))
     return _ALIASES.get(name, name)
@@ -190,7 +190,7 @@ def contiguous(name: str, value: ArrayLike) -> FloatArray:
     Contiguous because NumPy's loops over sin, cos or arctan2 may take another code path, with
     other last bits, when they step through memory with a stride.
     """
-    return np.asarray(as_numbers(name, value), order="C")
+    return np.asarray(check_numbers(name, value), order="C")
 
 
 def require_between(name: str, array: FloatArray, low: float, high: float, allowed: str) -> None:
@@ -230,7 +230,7 @@ def squarable(name: str, value: ArrayLike) -> FloatArray:
     return array
 
 
-def shaped(shape: tuple[int, ...], *arrays: FloatArray) -> tuple[FloatArray, ...]:
+def broadcast_results(shape: tuple[int, ...], *arrays: FloatArray) -> tuple[FloatArray, ...]:
     """Give every result the broadcast shape, its own memory, and a scalar for shape ()."""
     results = []
     for array in arrays:

@@ -17,19 +17,19 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 def gate_threshold(probability: float, size: int) -> float:
     """Return the squared Mahalanobis distance that holds detections with a probability."""
     low, high = 0.0, 1.0
-    while 1.0 - probability < _beyond(high, size):
+    while 1.0 - probability < _chi_square_survival(high, size):
         high *= 2.0
     while True:
         middle = 0.5 * (low + high)
         if middle in (low, high):
             return high
-        if 1.0 - probability < _beyond(middle, size):
+        if 1.0 - probability < _chi_square_survival(middle, size):
             low = middle
         else:
             high = middle
 
 
-def _beyond(distance: float, size: int) -> float:
+def _chi_square_survival(distance: float, size: int) -> float:
     """Return the probability of a larger squared distance (Abramowitz, Stegun, 26.4.4 and 5)."""
     half = 0.5 * distance
     total = 0.0 if size % 2 == 0 else math.erfc(math.sqrt(half))
@@ -42,7 +42,7 @@ def _beyond(distance: float, size: int) -> float:
     return total
 
 
-def alone(track: IntArray, detection: IntArray) -> BoolArray:
+def unambiguous_pairs(track: IntArray, detection: IntArray) -> BoolArray:
     """Return which pairs are the only one of both their track and their detection."""
     if len(track) == 0:
         return np.zeros(0, dtype=bool)
@@ -76,8 +76,8 @@ def groups(label: IntArray) -> list[IntArray]:
 
 def nearest(track: IntArray, detection: IntArray, distance: FloatArray) -> IntArray:
     """Take the nearest pair, then the nearest of what is left, and so on."""
-    taken = [np.flatnonzero(alone(track, detection))]
-    left = np.flatnonzero(~alone(track, detection))
+    taken = [np.flatnonzero(unambiguous_pairs(track, detection))]
+    left = np.flatnonzero(~unambiguous_pairs(track, detection))
     left = left[np.argsort(distance[left], kind="stable")]
     while len(left):
         # The first pair of its track and of its detection is taken whatever the others are.
@@ -95,17 +95,19 @@ def global_nearest(
     track: IntArray, detection: IntArray, distance: FloatArray, missing: FloatArray | float
 ) -> IntArray:
     """Take the pairs whose sum of distances, with a price for tracks left out, is the least."""
-    single = alone(track, detection)
+    single = unambiguous_pairs(track, detection)
     taken = [np.flatnonzero(single)]
     left = np.flatnonzero(~single)
     price = np.broadcast_to(missing, distance.shape)
     for part in groups(labels(track[left], detection[left])):
         pairs = left[part]
-        taken.append(pairs[_solved(track[pairs], detection[pairs], distance[pairs], price[pairs])])
+        taken.append(
+            pairs[_solve_assignment(track[pairs], detection[pairs], distance[pairs], price[pairs])]
+        )
     return np.sort(np.concatenate(taken))
 
 
-def _solved(
+def _solve_assignment(
     track: IntArray, detection: IntArray, distance: FloatArray, price: FloatArray
 ) -> IntArray:
     from scipy.optimize import linear_sum_assignment

@@ -43,7 +43,7 @@ def marginals(
         detections, column = np.unique(detection[pairs], return_inverse=True)
         weights = np.zeros((len(tracks), len(detections)))
         weights[row, column] = weight[pairs]
-        solve = exact if len(detections) <= exact_up_to else propagated
+        solve = exact if len(detections) <= exact_up_to else propagate_beliefs
         result[pairs] = solve(weights)[row, column]
     return result
 
@@ -75,7 +75,7 @@ def exact(weights: FloatArray) -> FloatArray:
     return result
 
 
-def propagated(weights: FloatArray) -> FloatArray:
+def propagate_beliefs(weights: FloatArray) -> FloatArray:
     """Return approximate marginals of one cluster, by belief propagation.
 
     Within 0.1 of exact ones in most clusters; where several tracks share the same detections and

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
-    checked_frequency,
-    not_negative,
+    check_frequency,
+    check_not_negative,
+    check_within,
     one_of,
     refuse,
     unflatten,
-    within,
 )
 from components.atmosphere.standard_atmosphere import columns, rows
 from dsa_des.arrays.types import FloatArray
@@ -54,10 +54,10 @@ def gas_specific_attenuation(
     1013.25 hPa there, which gives 1 % more; to repeat them, add the vapour's pressure to theirs.
     """
     shape, (frequency, pressure, temperature, density) = broadcast_flat(
-        frequency_hz=checked_frequency(frequency_hz, HIGHEST_FREQUENCY_HZ),
-        pressure_hpa=within("pressure_hpa", pressure_hpa, 0.0, 1e4, "hPa"),
-        temperature_k=within("temperature_k", temperature_k, 150.0, 350.0, "K"),
-        vapour_density_g_m3=not_negative("vapour_density_g_m3", vapour_density_g_m3),
+        frequency_hz=check_frequency(frequency_hz, HIGHEST_FREQUENCY_HZ),
+        pressure_hpa=check_within("pressure_hpa", pressure_hpa, 0.0, 1e4, "hPa"),
+        temperature_k=check_within("temperature_k", temperature_k, 150.0, 350.0, "K"),
+        vapour_density_g_m3=check_not_negative("vapour_density_g_m3", vapour_density_g_m3),
     )
     vapour_pressure = density * temperature / 216.7
     dry_pressure = pressure - vapour_pressure
@@ -154,7 +154,7 @@ def rain_coefficients(frequency_hz: float) -> RainCoefficients:
     -----
     Recommendation ITU-R P.838-3 (03/2005), eq. 2 and 3 with Tables 1-4.
     """
-    decades = math.log10(float(checked_frequency(float(frequency_hz), HIGHEST_FREQUENCY_HZ)))
+    decades = math.log10(float(check_frequency(float(frequency_hz), HIGHEST_FREQUENCY_HZ)))
     value = {"k_horizontal": 0.0, "k_vertical": 0.0, "alpha_horizontal": 0.0, "alpha_vertical": 0.0}
     for row in rows("rain_coefficients"):
         a, b = float(row["a"]), float(row["b"])
@@ -185,7 +185,9 @@ def polarisation_balance(polarisation: str | float) -> float:
     """
     if isinstance(polarisation, str):
         return POLARISATIONS[one_of("polarisation", polarisation, POLARISATIONS)]
-    return math.cos(2.0 * float(within("polarisation", polarisation, -math.pi, math.pi, "rad")))
+    return math.cos(
+        2.0 * float(check_within("polarisation", polarisation, -math.pi, math.pi, "rad"))
+    )
 
 
 def rain_specific_attenuation(
@@ -214,8 +216,10 @@ def rain_specific_attenuation(
     """
     coefficients = rain_coefficients(frequency_hz)
     shape, (rate, elevation) = broadcast_flat(
-        rain_rate_mm_h=not_negative("rain_rate_mm_h", rain_rate_mm_h),
-        elevation_rad=within("elevation_rad", elevation_rad, -math.pi / 2, math.pi / 2, "rad"),
+        rain_rate_mm_h=check_not_negative("rain_rate_mm_h", rain_rate_mm_h),
+        elevation_rad=check_within(
+            "elevation_rad", elevation_rad, -math.pi / 2, math.pi / 2, "rad"
+        ),
     )
     balance = np.cos(elevation) ** 2 * polarisation_balance(polarisation)
     return unflatten(coefficients.specific_attenuation(rate, balance), shape)
@@ -240,8 +244,8 @@ def fog_specific_attenuation_coefficient(frequency_hz: ArrayLike, temperature_k:
     double-Debye permittivity.
     """
     shape, (f, temperature) = broadcast_flat(
-        frequency_hz=checked_frequency(frequency_hz, HIGHEST_FREQUENCY_IN_FOG_HZ),
-        temperature_k=within("temperature_k", temperature_k, 233.15, 323.15, "K"),
+        frequency_hz=check_frequency(frequency_hz, HIGHEST_FREQUENCY_IN_FOG_HZ),
+        temperature_k=check_within("temperature_k", temperature_k, 233.15, 323.15, "K"),
     )
     excess = 300.0 / temperature - 1.0
     static = 77.66 + 103.3 * excess
@@ -275,5 +279,5 @@ def fog_specific_attenuation(
     -----
     Recommendation ITU-R P.840-8, eq. 1.
     """
-    water = not_negative("liquid_water_g_m3", liquid_water_g_m3)
+    water = check_not_negative("liquid_water_g_m3", liquid_water_g_m3)
     return fog_specific_attenuation_coefficient(frequency_hz, temperature_k) * water[()]

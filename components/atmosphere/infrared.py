@@ -7,7 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, finite, not_negative, positive, unflatten
+from components.arguments.checks import (
+    broadcast_flat,
+    check_not_negative,
+    finite,
+    positive,
+    unflatten,
+)
 from components.atmosphere.standard_atmosphere import (
     SEA_LEVEL_VAPOUR_DENSITY_G_M3,
     VAPOUR_SCALE_HEIGHT_KM,
@@ -62,10 +68,10 @@ def precipitable_water_mm(
     array of the broadcast shape, mm (1 mm is 1000 g/m²)
     """
     shape, (distance, own, target, density) = broadcast_flat(
-        range_m=not_negative("range_m", range_m),
+        range_m=check_not_negative("range_m", range_m),
         own_alt_m=finite("own_alt_m", own_alt_m),
         target_alt_m=finite("target_alt_m", target_alt_m),
-        density=not_negative("sea_level_vapour_density_g_m3", sea_level_vapour_density_g_m3),
+        density=check_not_negative("sea_level_vapour_density_g_m3", sea_level_vapour_density_g_m3),
     )
     low, climb = np.minimum(own, target), np.abs(target - own) / _VAPOUR_SCALE_HEIGHT_M
     level = climb < 1e-9
@@ -91,7 +97,7 @@ def mid_wave_transmission(water_mm: ArrayLike) -> Any:
     not follow Beer's law: the first millimetre takes a third, ten more a fifth. Carbon dioxide's
     own band at 4.3 µm, opaque over any range of interest, is as the windows were measured.
     """
-    shape, (water,) = broadcast_flat(water_mm=not_negative("water_mm", water_mm))
+    shape, (water,) = broadcast_flat(water_mm=check_not_negative("water_mm", water_mm))
     low, high = BANDS["mwir"]
     total = np.zeros_like(water)
     for start, end, a, k, beta, w0 in _WINDOWS:
@@ -129,7 +135,7 @@ def continuum_per_km(
     """
     shape, (wavelength, density, temperature, pressure) = broadcast_flat(
         wavelength_um=positive("wavelength_um", wavelength_um),
-        vapour_density_g_m3=not_negative("vapour_density_g_m3", vapour_density_g_m3),
+        vapour_density_g_m3=check_not_negative("vapour_density_g_m3", vapour_density_g_m3),
         temperature_k=positive("temperature_k", temperature_k),
         pressure_hpa=positive("pressure_hpa", pressure_hpa),
     )
@@ -163,7 +169,7 @@ def long_wave_transmission(
     Arguments are those of `precipitable_water_mm`.
     """
     shape, (distance, own, target) = broadcast_flat(
-        range_m=not_negative("range_m", range_m),
+        range_m=check_not_negative("range_m", range_m),
         own_alt_m=finite("own_alt_m", own_alt_m),
         target_alt_m=finite("target_alt_m", target_alt_m),
     )

@@ -13,7 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, finite, positive, refuse, unflatten, within
+from components.arguments.checks import (
+    broadcast_flat,
+    check_within,
+    finite,
+    positive,
+    refuse,
+    unflatten,
+)
 
 #: Pressure at sea level, hPa.
 STANDARD_HPA = 1013.25
@@ -69,7 +76,7 @@ def scene_air(weather: Any) -> dict[str, float]:
 def _checked(name: str, height_m: ArrayLike, qnh_hpa: ArrayLike, offset_k: ArrayLike) -> Any:
     offset = finite("offset_k", offset_k)
     refuse("offset_k", offset, offset <= -100.0, "be above -100")
-    height = within(name, height_m, LOWEST_M, HIGHEST_M, "m")
+    height = check_within(name, height_m, LOWEST_M, HIGHEST_M, "m")
     return broadcast_flat(height_m=height, qnh_hpa=positive("qnh_hpa", qnh_hpa), offset_k=offset)
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
-    as_numbers,
     broadcast_flat,
+    check_not_negative,
+    check_numbers,
     finite,
-    not_negative,
     positive,
     refuse,
     unflatten,
@@ -38,7 +38,7 @@ def rain_reflectivity_per_m(rain_rate_mm_h: ArrayLike, wavelength_m: float) -> A
     `HIGHEST_RAYLEIGH_HZ`, and there within 4 dB of spheres after Mie up to 25 mm/h; above, η is too
     large (12 dB at 94 GHz and 4 mm/h).
     """
-    rate = not_negative("rain_rate_mm_h", rain_rate_mm_h)
+    rate = check_not_negative("rain_rate_mm_h", rain_rate_mm_h)
     wave = float(positive("wavelength_m", wavelength_m))
     z_m3 = 200e-18 * rate**1.6
     return (math.pi**5 * DIELECTRIC_FACTOR / wave**4 * z_m3)[()]
@@ -72,7 +72,7 @@ def rain_volume_m3(
     ):
         positive(name, value)
     shape, (distance, elevation, height) = broadcast_flat(
-        range_m=not_negative("range_m", range_m),
+        range_m=check_not_negative("range_m", range_m),
         elevation_rad=finite("elevation_rad", elevation_rad),
         alt_m=finite("alt_m", alt_m),
     )
@@ -98,7 +98,7 @@ def rain_shell_m3(
     """
     positive("range_resolution_m", range_resolution_m)
     shape, (distance, own) = broadcast_flat(
-        range_m=not_negative("range_m", range_m), own_alt_m=finite("own_alt_m", own_alt_m)
+        range_m=check_not_negative("range_m", range_m), own_alt_m=finite("own_alt_m", own_alt_m)
     )
     top = np.clip(highest_m - own, -distance, distance)
     bottom = np.clip(lowest_m - own, -distance, distance)
@@ -108,7 +108,7 @@ def rain_shell_m3(
 
 def fall_speed_m_s(rain_rate_mm_h: ArrayLike) -> Any:
     """Return how fast rain falls as a radar sees it, m/s: 2.6 Z^0.107 (J. Joss, 1970)."""
-    rate = as_numbers("rain_rate_mm_h", rain_rate_mm_h)
+    rate = check_numbers("rain_rate_mm_h", rain_rate_mm_h)
     refuse("rain_rate_mm_h", rate, ~(rate >= 0.0), "be 0 or more")
     return (2.6 * (200.0 * rate**1.6) ** 0.107)[()]
 
@@ -122,7 +122,7 @@ def rain_spread_m_s(
     turbulence of 1 m/s and 1 m/s · sin(elevation) of the drops' fall (Nathanson, chapter 6).
     """
     shape, (distance, elevation) = broadcast_flat(
-        range_m=not_negative("range_m", range_m),
+        range_m=check_not_negative("range_m", range_m),
         elevation_rad=finite("elevation_rad", elevation_rad),
     )
     shear = 0.42 * _SHEAR_PER_S * elevation_beamwidth_rad * distance * np.cos(elevation)

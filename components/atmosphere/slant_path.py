@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
-    as_numbers,
     broadcast_flat,
+    check_not_negative,
+    check_numbers,
     finite,
-    not_negative,
     refuse,
     unflatten,
 )
@@ -103,14 +103,14 @@ def attenuation_table(
     15 km, and 4.5e-4 within the one step that holds the tropopause (11 km). Below -1 km and above
     40 km they stay as they are there.
     """
-    rain_rate = float(not_negative("rain_rate_mm_h", rain_rate_mm_h))
-    water = float(not_negative("fog_liquid_water_g_m3", fog_liquid_water_g_m3))
+    rain_rate = float(check_not_negative("rain_rate_mm_h", rain_rate_mm_h))
+    water = float(check_not_negative("fog_liquid_water_g_m3", fog_liquid_water_g_m3))
     for name, value in (
         ("rain_height_m", rain_height_m),
         ("fog_base_m", fog_base_m),
         ("fog_top_m", fog_top_m),
     ):
-        number = as_numbers(name, value)
+        number = check_numbers(name, value)
         refuse(name, number, np.isnan(number), "be an altitude or infinite")
     if not fog_top_m >= fog_base_m:
         raise ValueError(
@@ -188,7 +188,7 @@ def one_way_attenuation_db(
     100 km.
     """
     shape, (distance, own, target) = broadcast_flat(
-        range_m=not_negative("range_m", range_m),
+        range_m=check_not_negative("range_m", range_m),
         own_alt_m=finite("own_alt_m", own_alt_m),
         target_alt_m=finite("target_alt_m", target_alt_m),
     )
@@ -209,7 +209,7 @@ def two_way_transmission(one_way_db: ArrayLike) -> Any:
 
     10^(-2 A / 10); exactly 1 for 0 dB.
     """
-    shape, (attenuation,) = broadcast_flat(one_way_db=not_negative("one_way_db", one_way_db))
+    shape, (attenuation,) = broadcast_flat(one_way_db=check_not_negative("one_way_db", one_way_db))
     # Beyond 1600 dB one way nothing is left that a double could hold.
     gone = attenuation > 1600.0
     factor = np.power(10.0, -0.2 * np.where(gone, 0.0, attenuation))
@@ -279,8 +279,8 @@ def attenuated_range_m(clear_range_m: ArrayLike, specific_attenuation_db_km: Arr
     from scipy.special import lambertw
 
     shape, (clear, attenuation) = broadcast_flat(
-        clear_range_m=not_negative("clear_range_m", clear_range_m),
-        attenuation=not_negative("specific_attenuation_db_km", specific_attenuation_db_km),
+        clear_range_m=check_not_negative("clear_range_m", clear_range_m),
+        attenuation=check_not_negative("specific_attenuation_db_km", specific_attenuation_db_km),
     )
     with np.errstate(under="ignore"):  # a product too small for a double changes no range
         product = clear * (attenuation * (math.log(10.0) / 20.0 * 1e-3))

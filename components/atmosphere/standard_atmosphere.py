@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, not_negative, unflatten, within
+from components.arguments.checks import broadcast_flat, check_not_negative, check_within, unflatten
 from dsa_des.arrays.types import FloatArray
 
 _FOLDER = Path(__file__).parent / "data"
@@ -70,8 +70,10 @@ def standard_atmosphere(
     Recommendation ITU-R P.835-6 (12/2017), Annex 1, mean annual global reference atmosphere.
     """
     shape, (altitude, sea_level_vapour) = broadcast_flat(
-        altitude_m=within("altitude_m", altitude_m, LOWEST_ALTITUDE_M, HIGHEST_ALTITUDE_M, "m"),
-        density=not_negative("sea_level_vapour_density_g_m3", sea_level_vapour_density_g_m3),
+        altitude_m=check_within(
+            "altitude_m", altitude_m, LOWEST_ALTITUDE_M, HIGHEST_ALTITUDE_M, "m"
+        ),
+        density=check_not_negative("sea_level_vapour_density_g_m3", sea_level_vapour_density_g_m3),
     )
     height_km = altitude * 1e-3
     geopotential_km = _EARTH_RADIUS_KM * height_km / (_EARTH_RADIUS_KM + height_km)

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
-    as_numbers,
     broadcast_flat,
-    not_negative,
+    check_not_negative,
+    check_numbers,
     positive,
     refuse,
     unflatten,
@@ -54,7 +54,7 @@ def fog_visibility_m(
     Meteor. Climatol. 45, 2006.
     """
     shape, (water, number) = broadcast_flat(
-        liquid_water_g_m3=not_negative("liquid_water_g_m3", liquid_water_g_m3),
+        liquid_water_g_m3=check_not_negative("liquid_water_g_m3", liquid_water_g_m3),
         droplets_per_cm3=positive("droplets_per_cm3", droplets_per_cm3),
     )
     with np.errstate(under="ignore", over="ignore"):  # ends of the number range
@@ -80,7 +80,9 @@ def rain_extinction_per_m(rain_rate_mm_h: ArrayLike) -> Any:
     Recommendation ITU-R P.1814 (2007). Half of it is light bent by less than about a milliradian,
     which a camera with wide pixels still collects: an upper bound for a coarse camera.
     """
-    shape, (rate,) = broadcast_flat(rain_rate_mm_h=not_negative("rain_rate_mm_h", rain_rate_mm_h))
+    shape, (rate,) = broadcast_flat(
+        rain_rate_mm_h=check_not_negative("rain_rate_mm_h", rain_rate_mm_h)
+    )
     return unflatten(_RAIN_EXTINCTION_PER_M * np.power(rate, _RAIN_EXPONENT), shape)
 
 
@@ -111,7 +113,7 @@ def combined_visibility_m(*visibility_m: ArrayLike) -> Any:
     """
     arrays = {}
     for number, value in enumerate(visibility_m):
-        array = as_numbers("visibility_m", value)
+        array = check_numbers("visibility_m", value)
         refuse("visibility_m", array, ~(array > 0.0), "be above 0 (infinite for clear air)")
         arrays[f"visibility_m {number}"] = array
     shape, flat = broadcast_flat(**arrays)

@@ -15,7 +15,7 @@ WANTED_US = 1000.0
 _SCENE = "thesis"
 
 
-def measured(calls: int, repeats: int) -> dict[str, Any]:
+def measure_calls(calls: int, repeats: int) -> dict[str, Any]:
     """Return percentiles of the time of a call, us, over all calls of all repetitions.
 
     Four intruders fly towards and past the ownship; radar, EO and IR are all due at every call,

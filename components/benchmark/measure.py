@@ -15,7 +15,7 @@ KINDS = ("scenes", "pairs", "rates", "calls")
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure one thing and print what was found."""
+    """Run one benchmark case and print its result."""
     parser = argparse.ArgumentParser(prog="python -m components.benchmark.measure")
     parser.add_argument("kind", choices=KINDS)
     parser.add_argument("name")
@@ -24,27 +24,27 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.kind != "calls":  # a host has all of its machine
         pin()
-    say_json(_measured(options.kind, options.name, options.quick, options.repeats))
+    say_json(_measure_alone(options.kind, options.name, options.quick, options.repeats))
     return 0
 
 
-def _measured(kind: str, name: str, quick: bool, repeats: int) -> dict[str, Any]:
+def _measure_alone(kind: str, name: str, quick: bool, repeats: int) -> dict[str, Any]:
     """Measure with what the kind needs and nothing else in memory."""
     if kind == "scenes":
         from components.benchmark import scenes
 
-        return scenes.measured(name, quick, repeats)
+        return scenes.measure_scene(name, quick, repeats)
     if kind == "rates":
         from components.benchmark import rates
 
-        return rates.measured(name, quick, repeats)
+        return rates.measure_rate(name, quick, repeats)
     if kind == "calls":
         from components.benchmark import calls
 
-        return calls.measured(300 if quick else 1800, repeats)
+        return calls.measure_calls(300 if quick else 1800, repeats)
     from components.benchmark import pairs
 
-    return pairs.measured(name, quick, repeats)
+    return pairs.measure_pairs(name, quick, repeats)
 
 
 def pin() -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from statistics import median
 from typing import Any
 
-from components.benchmark.scenes import CLOCKED, chosen, engine_run, scene_of
+from components.benchmark.scenes import CLOCKED, engine_run, scene_of, select_cases
 from components.examples import folder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -50,12 +50,12 @@ def without_unused_effects(scene: Scene) -> Scene:
 
 
 def _effects(case: str, quick: bool) -> tuple[Scene, Scene]:
-    scene = scene_of(chosen([case])[0], quick=quick)
+    scene = scene_of(select_cases([case])[0], quick=quick)
     return scene, without_unused_effects(scene)
 
 
 def _processor(case: str, quick: bool) -> tuple[Scene, Scene]:
-    (result,) = chosen([case])
+    (result,) = select_cases([case])
     return scene_of(result, quick=quick, sets=_SHARED), scene_of(result, quick=quick)
 
 
@@ -65,7 +65,7 @@ def _alerting(case: str, quick: bool) -> tuple[Scene, Scene]:
     return load_scene(with_it, duration_s=duration_s), load_scene(plain, duration_s=duration_s)
 
 
-def _equipped(case: str, quick: bool) -> tuple[Scene, Scene]:
+def _scenes_to_compare(case: str, quick: bool) -> tuple[Scene, Scene]:
     plain = load_scene(folder() / f"{case}.toml", duration_s="40" if quick else None)
     tables = plain.resolved()
     copies = {name: f"{name}_b" for name in tables["blocks"] if name != "traffic"}
@@ -88,11 +88,11 @@ PAIRS = (
     Pair("alerting", "first light with alert levels of its tracks at 1 Hz, or without",
          2.0, "first_light", _alerting),
     Pair("both_equipped", "first light with all of it on the head-on aircraft too, or without",
-         2.1, "first_light", _equipped),
+         2.1, "first_light", _scenes_to_compare),
 )  # fmt: skip
 
 
-def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
+def measure_pairs(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     """Return by how much the CPU time of building and running grows; medians of pairs in turn."""
     (pair,) = (pair for pair in PAIRS if pair.name == name)
     forms = pair.forms(pair.case, quick)

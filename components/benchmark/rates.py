@@ -14,7 +14,7 @@ import numpy as np
 
 from components.alert_configuration.conf_file import read_conf
 from components.alerting.levels import due_levels, violation_times_s
-from components.benchmark.scenes import SCENES, chosen, replicas_of, scene_of
+from components.benchmark.scenes import SCENES, replicas_of, scene_of, select_cases
 from components.benchmark.shares import shares_by_block
 from components.benchmark.track_updates import LOOKS, by_stone_soup, plainly, updates
 from components.examples import folder
@@ -114,7 +114,7 @@ def replicas(count: int) -> Callable[[], object]:
 
 def replicas_all(count: int) -> Callable[[], object]:
     """Return what runs the same replicas with every column, and the truth, recorded to memory."""
-    (case,) = chosen(["monte_carlo"])
+    (case,) = select_cases(["monte_carlo"])
     scenes = replicas_of(scene_of(case, quick=False, sets=("record.truth=true",)), count)
 
     def do() -> None:
@@ -202,7 +202,7 @@ def _levels(count: int) -> Callable[[], object]:
     configuration = read_conf(folder() / "alerting" / "do365b.conf")
     levels, lookahead_s = configuration.alerters[0].levels, configuration["lookahead_time"]
     own, intruder = states(count, 10_000.0, 200.0, 1)
-    relative = own.less(intruder)
+    relative = own.relative_to(intruder)
     return lambda: due_levels(levels, violation_times_s(levels, relative, lookahead_s, None))
 
 
@@ -289,7 +289,7 @@ RATES = (
 )
 
 
-def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
+def measure_rate(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     """Return how many are done in a second of CPU, the median of some repetitions."""
     (rate,) = (rate for rate in RATES if rate.name == name)
     count = (rate.quick or rate.count // 10) if quick else rate.count

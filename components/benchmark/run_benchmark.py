@@ -10,10 +10,10 @@ from typing import Any
 
 from components.benchmark.pairs import PAIRS, Pair
 from components.benchmark.rates import RATES, Rate
-from components.benchmark.scenes import BenchmarkCase, chosen
+from components.benchmark.scenes import BenchmarkCase, select_cases
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import check_file
-from dsa_des.files.output_names import named
+from dsa_des.files.output_names import user_path
 from dsa_des.record.run_folder import write_json
 from dsa_des.terminal import terminal
 
@@ -40,9 +40,9 @@ def run_benchmark(
     rates = [rate for rate in RATES if not scenes or rate.name in scenes]
     others = {pair.name for pair in pairs} | {rate.name for rate in rates}
     names = [name for name in scenes if name not in others]
-    cases = [] if scenes and not names else chosen(names)
-    before = {} if compare is None else _read(Path(compare))
-    target = None if json_file is None else named(json_file, "--json")
+    cases = [] if scenes and not names else select_cases(names)
+    before = {} if compare is None else _read_results(Path(compare))
+    target = None if json_file is None else user_path(json_file, "--json")
     if target is not None:
         check_file(target, "--json")
     console = terminal.console()
@@ -82,8 +82,8 @@ class _Asked:
     quick: bool
     repeats: int
 
-    def measured(self, kind: str, things: Sequence[Any]) -> list[dict[str, Any]]:
-        """Return the rows of things with a name, each said before it is measured."""
+    def measure_named(self, kind: str, things: Sequence[Any]) -> list[dict[str, Any]]:
+        """Measure the named cases, printing each name first; return their rows."""
         rows = []
         for thing in things:
             self.console.print(f"{thing.name}: {thing.what} ...", style="dim")
@@ -105,7 +105,7 @@ class _Asked:
 def _cases(
     asked: _Asked, cases: list[BenchmarkCase], before: dict[str, Any]
 ) -> list[dict[str, Any]]:
-    rows = asked.measured("scenes", cases)
+    rows = asked.measure_named("scenes", cases)
     headings = ["scene", "M/s", "x plain", "wanted", "run s", "build s", "ms/s", "MB", "Parquet"]
     lines = []
     for case, row in zip(cases, rows, strict=True):
@@ -136,7 +136,7 @@ def _cases(
 
 
 def _pairs(asked: _Asked, pairs: list[Pair]) -> list[dict[str, Any]]:
-    rows = asked.measured("pairs", pairs)
+    rows = asked.measure_named("pairs", pairs)
     asked.show(
         ("what costs little", "times", "half of them", "at most"),
         [
@@ -150,7 +150,7 @@ def _pairs(asked: _Asked, pairs: list[Pair]) -> list[dict[str, Any]]:
 
 
 def _rates(asked: _Asked, rates: list[Rate]) -> list[dict[str, Any]]:
-    rows = asked.measured("rates", rates)
+    rows = asked.measure_named("rates", rates)
     asked.show(
         ("what is done often", "per s", "at least"),
         [
@@ -196,7 +196,7 @@ def _calls(asked: _Asked) -> list[dict[str, Any]]:
     return [row]
 
 
-def _read(path: Path) -> dict[str, dict[str, Any]]:
+def _read_results(path: Path) -> dict[str, dict[str, Any]]:
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))
         return {row["scene"]: row for row in rows}

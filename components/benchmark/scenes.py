@@ -76,7 +76,7 @@ CASES = (
 )
 
 
-def chosen(names: Sequence[str]) -> list[BenchmarkCase]:
+def select_cases(names: Sequence[str]) -> list[BenchmarkCase]:
     """Return the cases of these names, all for none."""
     known = {case.name: case for case in CASES}
     for name in names:
@@ -114,13 +114,13 @@ def replicas_of(scene: Scene, count: int) -> list[Scene]:
 _SAMPLED_REPLICAS = 5
 
 
-def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
+def measure_scene(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     """Return medians over interleaved repetitions, and the peak memory of a first run.
 
     What a user waits for is building and running: targets that are never in reach are found when a
     run is built. Their sum is what the ratio to the yardstick is made of.
     """
-    (case,) = chosen([name])
+    (case,) = select_cases([name])
     scene = scene_of(case, quick=quick)
     replicas = case.quick_replicas if quick else case.replicas
     scenes = replicas_of(scene, replicas) if replicas else []
@@ -157,7 +157,7 @@ def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     }
 
 
-def _timed(run: Callable[[], Any]) -> float:
+def _time_call(run: Callable[[], Any]) -> float:
     started = time.process_time()
     run()
     return time.process_time() - started
@@ -179,7 +179,7 @@ def engine_run(scene: Scene, scenes: list[Scene], sink: Sink | None) -> tuple[fl
         lock_step(scenes, recorder=recorder) if scenes else Simulation(scene, recorder=recorder)
     )
     build_s = time.process_time() - started
-    cpu_s = _timed(simulation.run)
+    cpu_s = _time_call(simulation.run)
     scans = _scans(simulation)
     traffic: Any = simulation.components["traffic"]
     return build_s, cpu_s, scans * len(getattr(traffic, "face", traffic).roster)
@@ -198,7 +198,7 @@ def _scans(simulation: Simulation) -> int:
 def _yardstick(case: BenchmarkCase, scene: Scene, scenes: list[Scene]) -> Callable[[], float]:
     """Prepare the yardstick; return what runs it and gives its seconds per target-scan."""
     step = max(1, len(scenes) // _SAMPLED_REPLICAS)
-    prepared = [yardstick.prepare(_flown(one)) for one in (scenes[::step] or [scene])]
+    prepared = [yardstick.prepare(_fly_if_steered(one)) for one in (scenes[::step] or [scene])]
 
     def seconds_per_unit() -> float:
         started = time.process_time()
@@ -208,7 +208,7 @@ def _yardstick(case: BenchmarkCase, scene: Scene, scenes: list[Scene]) -> Callab
     return seconds_per_unit
 
 
-def _flown(scene: Scene) -> Simulation:
+def _fly_if_steered(scene: Scene) -> Simulation:
     """Return a simulation to read the scene from; a steered ownship must have been flown."""
     simulation = Simulation(scene)
     if len(getattr(simulation.components["traffic"].own, "segments", ())) != 1:  # type: ignore[attr-defined]

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 import dsa_des
-from components.estimation.batched import product, product_transposed
+from components.estimation.batched import multiply_by_transpose, product
 from components.estimation.frame import SensorPose, pose_in_frame
 from components.estimation.measurement import position_of
 from components.tracking.filters import ExtendedKalman
@@ -135,7 +135,7 @@ class PlainLook:
     variance: FloatArray
 
 
-def seen(state: FloatArray, look: PlainLook, size: int) -> tuple[FloatArray, FloatArray]:
+def measure_state(state: FloatArray, look: PlainLook, size: int) -> tuple[FloatArray, FloatArray]:
     """Return what a look would measure of a state, (size,), and the derivative, (size, 6)."""
     away = state[:3] - look.position_m
     x, y, z = look.to_body @ away
@@ -175,7 +175,7 @@ def track_plainly(
             states[k], covariances[k] = state, covariance
             if count == 0:
                 continue
-            expected, slope = seen(state, look, size)
+            expected, slope = measure_state(state, look, size)
             apart = look.measured - expected
             apart[:, 0] = (apart[:, 0] + pi) % (2.0 * pi) - pi
             total = slope @ covariance @ slope.T
@@ -211,7 +211,7 @@ def plainly(targets: int) -> tuple[int, Callable[[], object]]:
     block = listening(1, targets)
     scans, poses = _looks(block)
     looks = plain_looks(scans, poses, block.context.ticks_per_s)
-    first, rest = _started(scans, poses, block.p.start_speed_m_s), looks[1:]
+    first, rest = _start_tracks(scans, poses, block.p.start_speed_m_s), looks[1:]
     updates = sum(len(look.measured) for look in rest)
     intensity = block.p.acceleration_intensity_m2_s3
     return updates, lambda: track_plainly(rest, *first, intensity, looks[0].time_s)
@@ -279,7 +279,7 @@ def _stone_soup_tracker(intensity: float, speed_m_s: float) -> Any:
 
 
 def _looks(block: Listening) -> tuple[Scans, SensorPose]:
-    scans = Scans.joined([scans_of(wake["fused"]) for wake in block.kept])
+    scans = Scans.concatenate([scans_of(wake["fused"]) for wake in block.kept])
     origin = scans.pose[:3, :1]
     lat, lon, alt = (np.repeat(value, len(scans)) for value in origin)
     pose = scans.pose
@@ -303,7 +303,7 @@ def plain_looks(scans: Scans, poses: SensorPose, ticks_per_s: int) -> list[Plain
     return result
 
 
-def _started(
+def _start_tracks(
     scans: Scans, poses: SensorPose, speed_m_s: float
 ) -> tuple[list[FloatArray], list[FloatArray]]:
     """Return a track for each detection of the first look, as our trackers start them."""
@@ -312,7 +312,7 @@ def _started(
     spread = np.zeros((3, 3, len(which)))
     for i in range(3):
         spread[i, i] = scans.variance[i, which]
-    turned = product_transposed(product(slope, spread), slope)
+    turned = multiply_by_transpose(product(slope, spread), slope)
     states, covariances = [], []
     for k in which.tolist():
         states.append(np.concatenate([position[:, k], np.zeros(3)]))

@@ -284,8 +284,8 @@ def run(scene: Prepared, every: int = 1) -> LoopResult:
                     if sensor.weight * covered * contrast < sensor.threshold:
                         continue
                 measured = (
-                    _rounded(p, sensor.azimuth_step, sensor.azimuth),
-                    _rounded(q, sensor.elevation_step, sensor.elevation),
+                    _round_to_step(p, sensor.azimuth_step, sensor.azimuth),
+                    _round_to_step(q, sensor.elevation_step, sensor.elevation),
                     round(range_m / sensor.range_step) * sensor.range_step
                     if sensor.range_step
                     else range_m,
@@ -302,5 +302,5 @@ def run(scene: Prepared, every: int = 1) -> LoopResult:
     return result
 
 
-def _rounded(value: float, step: float, limits: tuple[float, float]) -> float:
+def _round_to_step(value: float, step: float, limits: tuple[float, float]) -> float:
     return min(max(round(value / step) * step, limits[0]), limits[1])

@@ -224,11 +224,11 @@ def _hull(points: FloatArray) -> FloatArray:
 def _chain(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     result: list[tuple[float, ...]] = []
     for point in points:
-        while len(result) > 1 and _left(result[-2], result[-1], point) <= 0.0:
+        while len(result) > 1 and _signed_area(result[-2], result[-1], point) <= 0.0:
             result.pop()
         result.append(point)
     return result[:-1]
 
 
-def _left(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> float:
+def _signed_area(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> float:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

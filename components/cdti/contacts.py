@@ -59,7 +59,9 @@ class OwnFlight:
         apart_s = (self._tick[-1] - self._tick[then]) / ticks_per_s
         speed, climb = 0.0, 0.0
         if apart_s > 0.0:
-            east, north, up = _away(self._pose[-1], self._pose[then, np.newaxis, :3])[0].tolist()
+            east, north, up = _displacement_from(self._pose[-1], self._pose[then, np.newaxis, :3])[
+                0
+            ].tolist()
             speed, climb = math.hypot(east, north) / apart_s, -up / apart_s
         lat_deg, lon_deg, alt_m, yaw, pitch, roll = self._pose[-1].tolist()
         self.now = OwnNow(lat_deg, lon_deg, alt_m, yaw, pitch, roll, speed, climb)
@@ -70,7 +72,7 @@ class OwnFlight:
         return self._pose[np.maximum(index, 0)]
 
 
-def _away(own: FloatArray, position: FloatArray) -> FloatArray:
+def _displacement_from(own: FloatArray, position: FloatArray) -> FloatArray:
     """Return how far positions (n, 3) are east and north of a place, and how much higher, (n, 3).
 
     Latitude and longitude, deg, and altitude, m; NaN where they are not known.
@@ -102,7 +104,7 @@ class Contacts:
     position: FloatArray
     toward: FloatArray
 
-    def shown(self, own: OwnNow, time_s: float, forgotten_s: float) -> list[list[Any]]:
+    def rows_to_show(self, own: OwnNow, time_s: float, forgotten_s: float) -> list[list[Any]]:
         """Return the contacts as the page has them, ranged ones first.
 
         [number, east_m, north_m, up_m, bearing_deg, age_s] from the ownship as it is now; the three
@@ -111,7 +113,7 @@ class Contacts:
         fresh = np.flatnonzero(time_s - self.seen_s < forgotten_s)
         fresh = fresh[np.argsort(~self.ranged[fresh], kind="stable")]
         here = np.array([own.lat_deg, own.lon_deg, own.alt_m])
-        away = _away(here, self.position[fresh])
+        away = _displacement_from(here, self.position[fresh])
         bearing = np.degrees(self.toward[fresh, 0]) % 360.0
         table = np.round(np.column_stack([away, bearing, time_s - self.seen_s[fresh]]), 2)
         result = []
@@ -133,7 +135,7 @@ def contacts_of_lines(
     seen_s = message.measured_tick / ticks_per_s
     range_m, range_s = message.range_m, np.where(np.isfinite(message.range_m), seen_s, np.nan)
     if before is not None:
-        range_m, range_s = _held(message.target, seen_s, range_m, range_s, before)
+        range_m, range_s = _hold_ranges(message.target, seen_s, range_m, range_s, before)
     pose = own.poses(message.measured_tick)
     body = unit_vector_unchecked(message.azimuth_rad, message.elevation_rad)
     north, east, down = body_to_ned(*body, *pose[:, 3:].T)
@@ -149,10 +151,10 @@ def contacts_of_lines(
     return Contacts(*(np.concatenate([new, old[stays]]) for new, old in pairs))
 
 
-def _held(
+def _hold_ranges(
     number: IntArray, seen_s: FloatArray, range_m: FloatArray, range_s: FloatArray, before: Contacts
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the ranges with those of before where none was measured, and when they were."""
+    """Return the ranges, the previous one where none was measured, and when each was measured."""
     order = np.argsort(before.number, kind="stable")
     known = before.number[order]
     index = np.searchsorted(known, number)

@@ -144,7 +144,7 @@ class SessionControl:
         self._log: list[dict[str, Any]] = []
 
     def attach(self, server: "DisplayServer", pacer: LivePacer, admission: Admission) -> None:
-        """Learn with whom to work."""
+        """Set the scope, the server and the desk to work with."""
         self._server, self._pacer, self._admission = server, pacer, admission
 
     # -- the thread of the simulation --------------------------------------------------------------
@@ -159,9 +159,9 @@ class SessionControl:
             return True
         return self._pauses and self._operators == 0
 
-    def came_to(self, time_s: float, lag_s: float) -> None:
+    def show_time(self, time_s: float, lag_s: float) -> None:
         """Take note of how far the run has come, and show it."""
-        self._now = time_s, lag_s, None if self.scope is None else self.scope.received()
+        self._now = time_s, lag_s, None if self.scope is None else self.scope.take_received()
         if self._gone_at is not None:
             self.holds()
         if self.scope is not None and len(self.scope.names) != self._named:
@@ -177,7 +177,7 @@ class SessionControl:
         taken = sum(answer["type"] == "taken" for answer in self._answers.values())
         return f"{taken} decision{'' if taken == 1 else 's'} taken in, up to {self._now[0]:.1f} s"
 
-    def _told(self, message: Judged | Turned | Climbed, taken: Taken) -> dict[str, Any]:
+    def _decision_fields(self, message: Judged | Turned | Climbed, taken: Taken) -> dict[str, Any]:
         """Return what pages are told of a decision that was taken in: of its time, s, the alert's
         level, where a command leads to, until when, and what it replaces."""
         assert self.scope is not None
@@ -186,7 +186,7 @@ class SessionControl:
         }  # fmt: skip
         if isinstance(message, Judged) or not math.isfinite(taken.ends_s):
             return answer
-        answer["to"] = self.scope.led_to(message.decision, message.value)
+        answer["to"] = self.scope.commanded_value(message.decision, message.value)
         answer["ends"] = round(taken.ends_s, 6)
         if math.isfinite(taken.replaces_s):
             replaced = next(
@@ -211,7 +211,7 @@ class SessionControl:
         self._server.show()
 
     def welcome(self, role: str) -> dict[str, Any]:
-        """Return what a new page is told of the scene."""
+        """Return the first message to a new page: names, units and limits of the scene."""
         scope = self.scope
         duration = self._scene.duration_s
         return {
@@ -304,12 +304,12 @@ class SessionControl:
         self._answers[message.id] = {"type": "waits"}
 
         def taken(one: Taken) -> None:
-            answer = {"type": "taken", **content, **self._told(message, one)}
+            answer = {"type": "taken", **content, **self._decision_fields(message, one)}
             self._answers[message.id] = answer
             self._log.append(answer)
             self._server.tell(answer)
 
-        if self._desk.put(PendingDecision(decision, taken)):
+        if self._desk.submit(PendingDecision(decision, taken)):
             return True
         del self._answers[message.id]
         return False

@@ -23,7 +23,7 @@ class Reached(NamedTuple):
     far_m: FloatArray
 
 
-def lost_area(
+def predicted_loss_area(
     volume: Volume | TcasAdvisory,
     own_alt_m: float,
     own_mps: FloatArray,

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from components.view.page import page_filled, page_part, page_program
+from components.view.page import fill_page, page_part, page_program
 
 _PACKAGE = "components.cdti"
 #: The program's parts, in the order in which they need each other.
@@ -29,7 +29,7 @@ def page() -> tuple[str, str]:
     """
     script, digest = page_program(_PACKAGE, SCRIPTS)
     contents = {"style": page_part(_PACKAGE, "style.css"), "script": script}
-    return page_filled(_PACKAGE, "cdti.html", contents), digest
+    return fill_page(_PACKAGE, "cdti.html", contents), digest
 
 
 def headers(socket_address: str) -> dict[str, str]:
@@ -71,13 +71,13 @@ class Admission:
 
     def knows(self, token: str) -> bool:
         """Return whether a token is one of this run, used up or not."""
-        return any(_same(token, known) for known in self._watching)
+        return any(_is_same_word(token, known) for known in self._watching)
 
     def role(self, token: str, key: str) -> tuple[str, str]:
         """Return what a page with a token of this run may do, and the key of who decides."""
-        if self._key and _same(key, self._key):
+        if self._key and _is_same_word(key, self._key):
             return OPERATOR, self._key
-        if self._fresh and _same(token, self.token):
+        if self._fresh and _is_same_word(token, self.token):
             self._fresh = False
             self._key = _secret()
             return OPERATOR, self._key
@@ -95,7 +95,7 @@ def _secret() -> str:
     return secrets.token_urlsafe(24)
 
 
-def _same(one: str, other: str) -> bool:
+def _is_same_word(one: str, other: str) -> bool:
     return compare_digest(one.encode("utf-8", "replace"), other.encode())
 
 

@@ -20,7 +20,7 @@ from components.cdti.contacts import (
     contacts_of_lines,
     contacts_of_states,
 )
-from components.cdti.loss_area import lost_area
+from components.cdti.loss_area import predicted_loss_area
 from components.messages.alerts import (
     BAND_KINDS,
     BAND_REGIONS,
@@ -205,7 +205,7 @@ class Scope:
         """Return a contact's name as the run has it; empty for none, None if there is none."""
         return contact_name(self._names, contact)
 
-    def received(self) -> Received:
+    def take_received(self) -> Received:
         """Return all that was received until now; between two windows it is of one instant."""
         return Received(
             self._own.now, self._contacts, self._alerts, self._since, self._reported, self._bands,
@@ -219,7 +219,7 @@ class Scope:
         levels = self._alerts.level[self._alerts.target == contact]
         return int(levels.max(initial=0))
 
-    def led_to(self, decision: str, value: float) -> float:
+    def commanded_value(self, decision: str, value: float) -> float:
         """Return the heading that a turn leads to, deg, or the altitude that a climb does, m."""
         own = self._own.now
         assert own is not None
@@ -230,19 +230,24 @@ class Scope:
     def picture(self, time_s: float, received: Received | None = None) -> dict[str, Any]:
         """Return what is shown at an instant of what was received, for JSON: m, deg, s."""
         own, contacts, alerts, since, reported, bands, heard = (
-            self.received() if received is None else received
+            self.take_received() if received is None else received
         )
         if own is None:
             return {
                 "own": None, "contacts": [], "alerts": [], "area": [], "bands": {}, "out": []
             }  # fmt: skip
-        shown = [] if contacts is None else contacts.shown(own, time_s, FORGOTTEN_S)
+        shown = [] if contacts is None else contacts.rows_to_show(own, time_s, FORGOTTEN_S)
         flights: dict[int, list[float]] = {}
         said: list[dict[str, Any]] = []
         area: list[list[float]] = []
         if alerts is not None:
             if self._looked is None or self._looked[0] is not alerts:
-                self._looked = alerts, _flights(alerts), _said(alerts, since), self._area(alerts)
+                self._looked = (
+                    alerts,
+                    _flights(alerts),
+                    _alert_fields(alerts, since),
+                    self._area(alerts),
+                )
             _, flights, said, area = self._looked
         level = {one["target"]: one["level"] for one in said}
         for one in shown:
@@ -285,9 +290,9 @@ class Scope:
             if not first:
                 return None
             chosen = first[0]
-        return self._sights.picture(chosen, self._toward(chosen), time_s, own)
+        return self._sights.picture(chosen, self._direction_of(chosen), time_s, own)
 
-    def _toward(self, contact: int) -> tuple[float, float] | None:
+    def _direction_of(self, contact: int) -> tuple[float, float] | None:
         """Return the bearing and elevation of a contact as it was seen last, rad."""
         contacts = self._contacts
         if contacts is None:
@@ -306,7 +311,9 @@ class Scope:
         if level is None:
             return []
         relative = alerts.relative[:, on]
-        result = lost_area(level.volume, alerts.own_alt_m, alerts.own_mps, relative, _LOOKAHEAD_S)
+        result = predicted_loss_area(
+            level.volume, alerts.own_alt_m, alerts.own_mps, relative, _LOOKAHEAD_S
+        )
         degrees = np.degrees(result.direction_rad)
         return [
             [round(a, 1), round(b, 1), round(c, 1)]
@@ -336,7 +343,7 @@ def _bands_at(
     return result
 
 
-def _said(alerts: _Alerts, since: dict[int, float]) -> list[dict[str, Any]]:
+def _alert_fields(alerts: _Alerts, since: dict[int, float]) -> list[dict[str, Any]]:
     """Return the alerts that are on, the most urgent first."""
     result = []
     for index in np.flatnonzero(alerts.level > 0).tolist():

@@ -53,7 +53,7 @@ class Page:
         self._free = asyncio.Event()
         self._free.set()
 
-    def drawn(self, frame: int) -> None:
+    def note_drawn(self, frame: int) -> None:
         """Take note that a picture is on screen."""
         self._drawn = max(self._drawn, min(frame, self._sent))
         if self._sent - self._drawn < _AHEAD:
@@ -80,7 +80,7 @@ class PageControl(Protocol):
     """What a server asks of whoever runs the session; called in the server's thread."""
 
     def welcome(self, role: str) -> dict[str, Any]:
-        """Return what a new page is told."""
+        """Return the first message to a new page."""
 
     def frame(self, chosen: int) -> dict[str, Any] | None:
         """Return the newest picture, or None before the first."""
@@ -126,11 +126,11 @@ class DisplayServer:
 
     def show(self) -> None:
         """Let every page have a new picture when it can take one."""
-        self._from_outside(self._announce)
+        self._call_from_outside(self._announce)
 
     def tell(self, content: dict[str, Any]) -> None:
         """Tell every page."""
-        self._from_outside(lambda: self._tell_all(content))
+        self._call_from_outside(lambda: self._tell_all(content))
 
     def close(self, last: dict[str, Any]) -> None:
         """Say a last word to every page and end."""
@@ -141,10 +141,10 @@ class DisplayServer:
             await self._tell_all(last)
             self._stop.set()
 
-        self._from_outside(leave)
+        self._call_from_outside(leave)
         self._thread.join(_END_S)
 
-    def _from_outside(self, call: Callable[[], Awaitable[None]]) -> None:
+    def _call_from_outside(self, call: Callable[[], Awaitable[None]]) -> None:
         async def run() -> None:
             await call()
 
@@ -188,7 +188,7 @@ class DisplayServer:
         self._port = server.sockets[0].getsockname()[1]
         self._up.set()
         await self._stop.wait()
-        await _closed(server)
+        await _wait_closed(server)
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request: with the page, with a socket, or with what is wrong."""
@@ -257,7 +257,7 @@ class DisplayServer:
             await page.send({"type": "refused", "id": None, "why": f"this {error}"})
             return
         if isinstance(message, Drawn):
-            page.drawn(message.frame)
+            page.note_drawn(message.frame)
         else:
             await self._control.on_message(page, message)
 
@@ -359,7 +359,7 @@ def _json(content: dict[str, Any]) -> str:
     return json.dumps(content, allow_nan=False, separators=(",", ":"))
 
 
-async def _closed(server: Server) -> None:
+async def _wait_closed(server: Server) -> None:
     server.close(code=1001, reason="the run has ended")
     with suppress(TimeoutError):
         await asyncio.wait_for(server.wait_closed(), 2.0)

@@ -20,7 +20,7 @@ from dsa_des.library.scenes import load_scene
 from dsa_des.running.pacing import parse_factor
 from dsa_des.running.recorded_run import record_run
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.interruption import Terminated
 from dsa_des.terminal.terminal import say
@@ -59,10 +59,10 @@ def run_session(
     speed = parse_factor(realtime)
     _check_host(host)
     # By its whole path, so that the run folder's scene finds its files from wherever it is run.
-    path = Path(os.path.abspath(chosen_file(scene, "scene")))
+    path = Path(os.path.abspath(find_input_file(scene, "scene")))
     loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
     console = _console(loaded)
-    target = OutputFolder.chosen(out, Path("runs"), loaded.path.stem)
+    target = OutputFolder.from_option(out, Path("runs"), loaded.path.stem)
     target.check()
     replay = _replay(loaded, console, target.path)
     desk = Desk()
@@ -71,7 +71,7 @@ def run_session(
     )
     admission = Admission()
     server = DisplayServer(host, port, admission, control)
-    pacer = LivePacer(speed, control.holds, control.came_to)
+    pacer = LivePacer(speed, control.holds, control.show_time)
     control.attach(server, pacer, admission)
     server.start()
     say(f"display: {server.address(admission.token)}")

@@ -78,7 +78,7 @@ class Flights:
         self.targets = [self._track(target, count) for target in chosen]
 
     @classmethod
-    def of(cls, simulation: Simulation, summary: dict[str, Any]) -> "Flights | None":
+    def from_simulation(cls, simulation: Simulation, summary: dict[str, Any]) -> "Flights | None":
         """Return the flights of a run, or None if it has no `TrafficSource`."""
         met = {
             name: entry["closest_approach"]
@@ -92,11 +92,11 @@ class Flights:
                 return cls(component, float(simulation.duration_s), closest_s, nearest_m)
         return None
 
-    def at(self, name: str, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def position_at(self, name: str, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return east and north of a target in km at some times; NaN where it is not known."""
         target = self._targets.get(name)
         if target is None and name == self._source.roster.own_name:
-            return self.own_at(time_s)
+            return self.ownship_position_at(time_s)
         if target is None:
             nothing = np.full(len(time_s), np.nan)
             return nothing, nothing
@@ -107,7 +107,7 @@ class Flights:
         """What other platforms call the ownship."""
         return self._source.roster.own_name
 
-    def own_at(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def ownship_position_at(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return east and north of the ownship in km at some times."""
         return self._map(self._source.own.at(time_s))
 
@@ -191,7 +191,7 @@ def positions(flights: Flights, detected: Detected) -> Positions:
     for target, parts in sorted(wanted.items()):
         # One call per target for all sensors together.
         times = np.concatenate([times for _, times in parts])
-        east, north = flights.at(detected.names[target], times)
+        east, north = flights.position_at(detected.names[target], times)
         start = 0
         for name, part in parts:
             here = slice(start, start + len(part))
@@ -201,7 +201,7 @@ def positions(flights: Flights, detected: Detected) -> Positions:
     return result
 
 
-def where_detected(flights: Flights, result: Positions) -> FloatArray:
+def plot_extent_points(flights: Flights, result: Positions) -> FloatArray:
     """Return the start, the detections and the ownship at their times, shape (points, 2)."""
     points = [np.zeros((1, 2))]
     own = flights.own

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from components.display.flights import Flights, Positions, where_detected
+from components.display.flights import Flights, Positions, plot_extent_points
 from components.geometry import sector_width_rad
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import Mark
@@ -33,7 +33,8 @@ class Outline:
 def outline_of(
     yaw_rad: float, reach: Any, axes: Any, start_km: tuple[float, float] = (0.0, 0.0)
 ) -> Outline:
-    """Return a reach from above, of who is level at `start_km`, east and north, nose at `yaw_rad`.
+    """Return a sensor's reach seen from above, of a level ownship at `start_km` (east, north),
+    heading `yaw_rad`.
 
     It is drawn as the plane of elevation 0 of the sensor's axes; a tilted sensor foreshortens it.
     """
@@ -115,7 +116,7 @@ class MapView:
         points = np.concatenate([np.zeros((1, 2)), points])
         #: Whether flights leave the map.
         self.cropped = False
-        seen = where_detected(flights, positions)
+        seen = plot_extent_points(flights, positions)
         if np.ptp(seen, axis=0).max() < 0.2 * np.ptp(points, axis=0).max() and len(seen) > 1:
             self.cropped = True
             spare = max(0.05, 0.5 * float(np.ptp(seen, axis=0).max()))

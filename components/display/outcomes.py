@@ -13,7 +13,7 @@ import numpy as np
 from components.display.summary import Columns, rows_by_name
 from components.messages.alerts import AlertLevels
 from components.messages.columns import ORIGIN, POSITION
-from components.messages.state_tracks import StateTracks, held
+from components.messages.state_tracks import StateTracks, is_held
 from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates
 from components.metrics.true_states import TargetsInFrame
@@ -62,7 +62,7 @@ class TrackSummary:
 
     def update(self, table: str, columns: Columns) -> None:
         """Take rows of ``state_tracks``."""
-        confirmed = held(columns["track_status"])
+        confirmed = is_held(columns["track_status"])
         for name, rows in rows_by_name(columns["block"]):
             self._entries[name].add(columns, rows[confirmed[rows]])
 
@@ -198,7 +198,7 @@ class PlatformSummary:
         return {}
 
 
-def on_board(summary: Mapping[str, Any], platform: str) -> dict[str, Any]:
+def select_platform(summary: Mapping[str, Any], platform: str) -> dict[str, Any]:
     """Return of a summary's sections by block what is on a platform, and whom that comes near."""
     carried = summary["platforms"][platform]
     blocks = set(carried["blocks"])
@@ -240,7 +240,7 @@ class _Tracker:
 
     def _compare(self, columns: Columns, rows: IntArray) -> None:
         assert self._targets is not None
-        apart = distances(columns, rows, self._targets.at(columns["state_s"][rows]))
+        apart = distances(columns, rows, self._targets.positions_at(columns["state_s"][rows]))
         # What is not there is no distance away; a scene may have no targets at all.
         nearest = np.fmin.reduce(apart, axis=0, initial=np.inf)
         near = nearest < NEAR_M
@@ -288,10 +288,10 @@ def _recorded_targets(simulation: Simulation) -> Any:
     sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
     if not sources or not all(source.says_truth for source in sources):
         return None
-    return lambda tracker, origin: TargetsInFrame(seen_by(simulation, tracker), origin)
+    return lambda tracker, origin: TargetsInFrame(flights_seen_from(simulation, tracker), origin)
 
 
-def seen_by(simulation: Simulation, block: str) -> list[Any]:
+def flights_seen_from(simulation: Simulation, block: str) -> list[Any]:
     """Return the flights, as known now, of all that a block's platform may see."""
     sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
     platform = simulation.components[block].context.platform

@@ -99,9 +99,9 @@ def estimated_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
     """
     if "state_tracks" not in run.tables:
         return np.empty(0, dtype=np.int64), np.empty((3, 0))
-    ned_m = run.stacked("state_tracks", POSITION)
+    ned_m = run.stack_columns("state_tracks", POSITION)
     rows = np.flatnonzero(np.isfinite(ned_m).all(axis=0))
-    return rows, offset_positions(ned_m[:, rows], run.stacked("state_tracks", ORIGIN, rows))
+    return rows, offset_positions(ned_m[:, rows], run.stack_columns("state_tracks", ORIGIN, rows))
 
 
 def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
@@ -112,7 +112,7 @@ def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
     nothing = np.empty(0, dtype=np.int64), np.empty((3, 0))
     if "tracks" not in run.tables:
         return nothing
-    lines = run.stacked("tracks", LINE)
+    lines = run.stack_columns("tracks", LINE)
     measured_s = run.numbers("tracks", "measured_s")
     names, blocks = run.texts("tracks", "target"), run.texts("tracks", "block")
     measured: dict[tuple[str, str], float] = {}
@@ -126,7 +126,7 @@ def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
         return nothing
     rows = np.array(kept)
     if run.has("tracks", POSE[0]):  # as believed, where that is recorded
-        pose: FloatArray | None = run.stacked("tracks", POSE, rows)
+        pose: FloatArray | None = run.stack_columns("tracks", POSE, rows)
     else:
         pose = run.true_poses(measured_s[rows])
     if pose is None:
@@ -134,4 +134,4 @@ def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
             f"{run.folder}: truth.parquet does not say where the ownship was when tracks were "
             "measured: record it with truth = true under [record]"
         )
-    return rows, sights(run.stacked("tracks", LINE, rows), pose)[1]
+    return rows, sights(run.stack_columns("tracks", LINE, rows), pose)[1]

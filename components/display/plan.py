@@ -24,14 +24,14 @@ from components.display.symbols import (
     OWN,
     TARGET,
     Labels,
+    add_grid,
+    alternate_marks,
     draw_lines,
     draw_marks,
-    gridded,
-    in_turns,
     mark_of,
     name_lines,
-    over_time,
     platform_colours,
+    set_time_axis,
     targets_key,
 )
 from components.display.terminal import distance_text
@@ -84,7 +84,7 @@ def draw_plan(
         axes.set(xlim=view.x, ylim=view.y)
         axes.set_xlabel("east of the ownship's start (km)")
         axes.set_ylabel("north of the ownship's start (km)")
-        gridded(axes)
+        add_grid(axes)
         for name, outline in outlines.items():
             draw_outline(axes, outline, detected.styles, name, view.farthest_km)
         _draw_tracks(axes, view, flights)
@@ -93,7 +93,7 @@ def draw_plan(
         above = {name: (t.time_s, t.east_km, t.north_km) for name, t in tracks.items()}
         draw_alerted_lines(axes, alerted, above)
         for name, when_s in alerted.manoeuvres.items():
-            draw_manoeuvres(axes, *flights.at(name or flights.own_name, when_s))
+            draw_manoeuvres(axes, *flights.position_at(name or flights.own_name, when_s))
         drawn = {
             name: _draw_marks(axes, view, marks[name], detected.styles, name)
             for name in detected.sensors
@@ -181,7 +181,7 @@ def _draw_marks(
     points = []
     for track, time_s, east, north in paths:
         along_px = np.interp(time_s, track.time_s, track.along_km) / view.km_per_px
-        points.append(np.column_stack((east, north))[in_turns(along_px, styles, name)])
+        points.append(np.column_stack((east, north))[alternate_marks(along_px, styles, name)])
     return draw_marks(axes, styles[name], np.concatenate(points))
 
 
@@ -200,7 +200,7 @@ def _draw_altitudes(
     low, high = (float(every.min()), float(every.max())) if len(every) else (0.0, 0.0)
     half = max(high - low, _LEAST_SPAN_M) * 0.58
     axes.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
-    over_time(axes, 0.0, flights.duration_s, "altitude (m)")
+    set_time_axis(axes, 0.0, flights.duration_s, "altitude (m)")
     *others, own = lines.values()
     draw_lines(axes, others, own)
     if len(tracks) <= MOST_NAMED:
@@ -208,7 +208,7 @@ def _draw_altitudes(
     for name, style in styles.items():
         points = []
         for track, time_s, _, _ in marks.get(name, []):
-            kept = time_s[in_turns(time_s * px_per_s, styles, name)]
+            kept = time_s[alternate_marks(time_s * px_per_s, styles, name)]
             points.append(np.column_stack((kept, np.interp(kept, track.time_s, track.alt_m))))
         if points:
             draw_marks(axes, style, np.concatenate(points))
@@ -230,7 +230,9 @@ def _draw_closest(axes: Any, view: MapView, flights: Flights, colours: Mapping[s
     met = _nearest_first(flights)
     if met:
         there = np.array([[east, north] for _, _, _, east, north in met])
-        own = np.column_stack(flights.own_at(np.array([time_s for _, _, time_s, _, _ in met])))
+        own = np.column_stack(
+            flights.ownship_position_at(np.array([time_s for _, _, time_s, _, _ in met]))
+        )
         axes.add_collection(
             LineCollection(list(np.stack((own, there), axis=1)), colors="#333333", linewidths=0.7,
                            linestyles=":", zorder=3.0), autolim=False,

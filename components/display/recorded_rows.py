@@ -26,7 +26,7 @@ _SCANS = ("block", "time_s", "detected")
 _DETECTIONS = ("block", "target", "time_s", "true_range_m")
 
 
-def each_row_group(
+def iterate_row_groups(
     path: Path, columns: Sequence[str], most: float = math.inf
 ) -> Iterator[dict[str, Any]]:
     """Give columns of each row group that has rows, in order; a table that is not there has none.
@@ -67,7 +67,7 @@ def _array(column: Any, text: bool) -> Any:
 
 def read_fused(folder: Path) -> Iterator[tuple[FloatArray, IntArray, tuple[str, ...]]]:
     """Give for each row group of ``fused``, in order: times, codes of combinations, their names."""
-    for rows in each_row_group(folder / "fused.parquet", ("time_s", "sensors")):
+    for rows in iterate_row_groups(folder / "fused.parquet", ("time_s", "sensors")):
         yield rows["time_s"], rows["sensors"].codes, rows["sensors"].names
 
 
@@ -93,7 +93,7 @@ class Detected:
         series: dict[tuple[str, int], int] = {}
 
         def pieces() -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
-            for group in each_row_group(folder / "detections.parquet", _DETECTIONS):
+            for group in iterate_row_groups(folder / "detections.parquet", _DETECTIONS):
                 code, names = group["target"].codes, group["target"].names
                 # Codes of a row group speak of that row group's names only.
                 lookup = np.array([known.setdefault(name, len(known)) for name in names] or [0])
@@ -108,7 +108,7 @@ class Detected:
                 number = np.array(ids, dtype=np.int64)[which]
                 yield number, group["time_s"][index], group["true_range_m"][index]
 
-        number, (time_s, range_m) = thinned(pieces, MOST_ROWS, 2)
+        number, (time_s, range_m) = thin_rows(pieces, MOST_ROWS, 2)
         all_sensors = sorted({*sensors, *(name for name, _ in series)})
         sensor = np.array([all_sensors.index(name) for name, _ in series], dtype=np.int64)[number]
         target = np.array([target for _, target in series], dtype=np.int64)[number]
@@ -122,7 +122,7 @@ class Detected:
         )
 
 
-def thinned(
+def thin_rows(
     pieces: Callable[[], Iterable[tuple[Any, ...]]], most: int, columns: int
 ) -> tuple[IntArray, list[FloatArray]]:
     """Return the rows that are kept of many series: their series and columns, in order.
@@ -211,7 +211,7 @@ class ScansShown:
 def read_scans(folder: Path) -> dict[str, SensorScans]:
     """Return what the table ``scans`` of a run folder says of each sensor, by name."""
     result: dict[str, SensorScans] = {}
-    for rows in each_row_group(folder / "scans.parquet", _SCANS):
+    for rows in iterate_row_groups(folder / "scans.parquet", _SCANS):
         for name, (time_s, hit_s) in _by_sensor(rows).items():
             first, last = float(time_s[0]), float(time_s[-1])
             scans = result.setdefault(name, SensorScans(0, first, last, None))
@@ -229,7 +229,7 @@ def scans_between(
     times: dict[str, list[FloatArray]] = {name: [] for name in scans}
     hits: dict[str, list[FloatArray]] = {name: [] for name in times}
     before: dict[str, FloatArray] = {}
-    for rows in each_row_group(folder / "scans.parquet", _SCANS):
+    for rows in iterate_row_groups(folder / "scans.parquet", _SCANS):
         if float(rows["time_s"][0]) > end_s:
             break
         for name, (time_s, hit_s) in _by_sensor(rows).items():

@@ -143,7 +143,7 @@ class RecordedTables:
         except (TypeError, ValueError):
             raise UsageError(f"{self.folder}: {table}.parquet: {name} holds no numbers") from None
 
-    def stacked(
+    def stack_columns(
         self, table: str, names: Iterable[str], rows: IntArray | slice = slice(None)
     ) -> FloatArray:
         """Return columns of numbers of some rows, (columns, rows)."""
@@ -204,7 +204,7 @@ def tables_of(run: Run | str | os.PathLike[str]) -> RecordedTables:
     return read_tables(os.fspath(run))
 
 
-def or_a_scene(name: str) -> str:
+def suggest_scene(name: str) -> str:
     """Return what to do where a shipped scene is named in the place of a run, or nothing."""
     scene = find_example(name, "scene")
     return f"; of the scene: dsa-des run {name}, then the folder it names" if scene else ""
@@ -214,7 +214,7 @@ def read_tables(run: str) -> RecordedTables:
     """Read all tables of a run's folder; `UsageError` where it is none or one cannot be read."""
     folder = Path(run)
     if not folder.is_dir():
-        raise UsageError(f"{run}: there is no such folder{or_a_scene(run)}")
+        raise UsageError(f"{run}: there is no such folder{suggest_scene(run)}")
     paths = sorted(folder.glob("*.parquet"))
     if not (folder / "run.json").is_file() or not paths:
         raise UsageError(f"{run}: holds no run: run.json or its tables are missing")

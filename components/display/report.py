@@ -80,7 +80,7 @@ class DetectAndSenseReport:
         from components.display.timeline import draw_timeline
         from components.display.tracks import DrawnTracks, draw_tracks
 
-        flights = Flights.of(simulation, summary)
+        flights = Flights.from_simulation(simulation, summary)
         detected = Detected.read(folder, sensor_names(simulation))
         carrying = carried_blocks(simulation)
         detected.styles = styles_of(detected.sensors, simulation.components, carrying)

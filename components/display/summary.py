@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from components.messages.detections import Detections
-from components.metrics.censored import END, START, in_scan
+from components.metrics.censored import END, START, is_in_scan
 from dsa_des.arrays.types import IntArray
 
 #: Columns of recorded rows; of text `dsa_des.block.message.Text`.
@@ -146,7 +146,7 @@ class _Sensor:
         if seen is None:
             return None
         result = seen.result()
-        if self.span is not None and in_scan(seen.tick, self.span[end]):
+        if self.span is not None and is_in_scan(seen.tick, self.span[end]):
             result["at"] = (START, END)[end]
         return result
 

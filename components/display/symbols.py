@@ -8,7 +8,7 @@ import numpy as np
 
 from components.sensor.marks import COOPERATIVE, EO, FUSION, IR, LASER, RADAR, TRACKER
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.mark import Mark, marks_of, told_apart
+from dsa_des.block.mark import Mark, distinguish_marks, marks_of
 from dsa_des.record.drawing import figure_text
 
 FONT_SIZE = 8
@@ -96,7 +96,7 @@ def block_marks(types: Mapping[str, str]) -> dict[str, Mark]:
         name: next((mark for start, mark in _KINDS if kind.startswith(start)), None)
         for name, kind in types.items()
     }
-    result = told_apart(kinds)
+    result = distinguish_marks(kinds)
     before: dict[Mark, int] = {}
     for name, kind in sorted(kinds.items()):
         if kind is not None:
@@ -121,7 +121,7 @@ def _luminance(parts: list[int]) -> float:
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
-def staggered(along_px: FloatArray, spacing_px: float, phase: float) -> IntArray:
+def stagger_marks(along_px: FloatArray, spacing_px: float, phase: float) -> IntArray:
     """Return the indices of marks about `spacing_px` apart along a path, ascending.
 
     Several sensors that mark the same path take turns on it, each at its `phase`, a share of the
@@ -140,12 +140,12 @@ def evenly(count: int, most: int) -> IntArray:
     return np.linspace(0, count - 1, most).astype(np.int64)
 
 
-def in_turns(
+def alternate_marks(
     along_px: FloatArray, styles: Mapping[str, Mark], name: str, shift: float = 0.0
 ) -> IntArray:
     """Return the indices of the marks of a sensor whose turn it is among all on a path."""
     phase = list(styles).index(name) / len(styles) + shift
-    return staggered(along_px, _SPACING_PX * len(styles), phase)
+    return stagger_marks(along_px, _SPACING_PX * len(styles), phase)
 
 
 def draw_marks(axes: Any, style: Mark, points: FloatArray) -> int:
@@ -215,14 +215,14 @@ def targets_key(dense: bool) -> Any:
     )
 
 
-def over_time(axes: Any, start_s: float, end_s: float, what: str) -> None:
+def set_time_axis(axes: Any, start_s: float, end_s: float, what: str) -> None:
     """Give axes a time from start to end, what stands on the other, and a grid."""
     axes.set_xlim(start_s, max(end_s, start_s + 1e-9))
     axes.set(xlabel="time (s)", ylabel=what)
-    gridded(axes)
+    add_grid(axes)
 
 
-def gridded(axes: Any) -> None:
+def add_grid(axes: Any) -> None:
     """Give axes a grid behind what is drawn."""
     axes.grid(color="#DDDDDD", linewidth=0.5)
     axes.set_axisbelow(True)
@@ -299,7 +299,7 @@ class Labels:
                 cost = sum(_overlap(box, other) for other in self._taken)
                 cost += 2 * (width * height - _overlap(box, (0.0, 0.0, right, top)))
                 # A free place must not seem taken by the rounding of its corners.
-                cost = round(cost + self._covered(box), 6)
+                cost = round(cost + self._covered_area(box), 6)
                 if best is None or cost < best[0]:
                     best = (cost, box)
             if best is not None and best[0] == 0:
@@ -314,7 +314,7 @@ class Labels:
             bbox={"facecolor": "white", "alpha": 0.65, "edgecolor": "none", "pad": 0.8}, zorder=4.0,
         )  # fmt: skip
 
-    def _covered(self, box: Box) -> float:
+    def _covered_area(self, box: Box) -> float:
         """Return about the area of the obstacles that a box would cover."""
         x, y = self._obstacles.T
         inside = (x > box[0]) & (x < box[2]) & (y > box[1]) & (y < box[3])

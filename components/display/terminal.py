@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from typing import Any
 
-from components.display.outcomes import NEAR_M, on_board
+from components.display.outcomes import NEAR_M, select_platform
 from dsa_des.record.undone import undone_sentences
-from dsa_des.text.safe_text import printable, shortened
+from dsa_des.text.safe_text import printable, shorten
 
 MOST_TARGETS = 10
 MOST_IN_A_LINE = 4
@@ -18,7 +18,7 @@ def show(console: Any, summary: dict[str, Any]) -> None:
     """
     for platform in summary.get("platforms") or ():
         _print_line(console, f"On board of {platform}")
-        _show_chain(console, on_board(summary, platform), platform)
+        _show_chain(console, select_platform(summary, platform), platform)
         console.print()
     if not summary.get("platforms"):
         _show_chain(console, summary, "the ownship")
@@ -190,7 +190,7 @@ def _tracks_text(entry: dict[str, Any]) -> str:
         text += f"; position error {distance_text(entry['position_error_m'])} rms"
     if not entry.get("targets"):
         return f"{text}; first confirmed {_first_text(entry['first_confirmed'])}"
-    firsts = [f"{name} {_first_text(first)}" for name, first in _few(entry["targets"])]
+    firsts = [f"{name} {_first_text(first)}" for name, first in _first_targets(entry["targets"])]
     text += f"; first within {NEAR_M:g} m of {', '.join(firsts)}"
     return text + _more_text(entry["targets"])
 
@@ -209,11 +209,11 @@ def _span_text(entry: dict[str, Any]) -> str:
 def _whom_text(targets: dict[str, dict[str, float]]) -> str:
     if len(targets) == 1:
         return next(iter(targets))
-    spans = [f"{name} {_span_text(entry)}" for name, entry in _few(targets)]
+    spans = [f"{name} {_span_text(entry)}" for name, entry in _first_targets(targets)]
     return ", ".join(spans) + _more_text(targets)
 
 
-def _few(targets: dict[str, Any]) -> list[tuple[str, Any]]:
+def _first_targets(targets: dict[str, Any]) -> list[tuple[str, Any]]:
     """Return the first few targets, in order of time."""
     return sorted(targets.items(), key=lambda item: next(iter(item[1].values())))[:MOST_IN_A_LINE]
 
@@ -291,7 +291,7 @@ def _print_table(
             overflow="fold",
         )
     for row in rows:
-        table.add_row(*(Text(shortened(text)) for text in row))
+        table.add_row(*(Text(shorten(text)) for text in row))
     console.print(Text(title, style="bold"))
     console.print(table)
     console.print()

@@ -21,13 +21,13 @@ from components.display.recorded_rows import (
 from components.display.symbols import (
     DENSE,
     MOST_NAMED,
+    alternate_marks,
     by_target,
     draw_lines,
     draw_marks,
-    in_turns,
     mark_of,
     name_lines,
-    over_time,
+    set_time_axis,
     targets_key,
 )
 from dsa_des.arrays.types import FloatArray
@@ -105,17 +105,17 @@ def find_close_up(scans: Scans, folder: Path, duration_s: float) -> CloseUp:
     first = [one.first_hit_s for one in scans.values() if one.first_hit_s is not None]
     if first:
         anchor_s, what = min(first), "Around the first detection"
-    together = _first_joined(folder, len(scans))
+    together = _find_first_combination(folder, len(scans))
     if together is not None:
         anchor_s, number = together
         word = {2: "two", 3: "three", 4: "four"}.get(number, str(number))
         what = f"Around the first fusion of {word} sensors"
     start_s = max(0.0, min(anchor_s - 0.3 * length_s, duration_s - length_s))
     end_s = start_s + length_s
-    return CloseUp(start_s, end_s, what, _joined(folder, start_s, end_s))
+    return CloseUp(start_s, end_s, what, _combinations(folder, start_s, end_s))
 
 
-def _first_joined(folder: Path, sensors: int) -> tuple[float, int] | None:
+def _find_first_combination(folder: Path, sensors: int) -> tuple[float, int] | None:
     """Return the first instant of the largest combination, and its size; None if there is none."""
     best: tuple[float, int] | None = None
     for time_s, code, names in read_fused(folder):
@@ -128,7 +128,7 @@ def _first_joined(folder: Path, sensors: int) -> tuple[float, int] | None:
     return best
 
 
-def _joined(folder: Path, start_s: float, end_s: float) -> list[tuple[float, list[str]]]:
+def _combinations(folder: Path, start_s: float, end_s: float) -> list[tuple[float, list[str]]]:
     result: set[tuple[float, str]] = set()
     for time_s, code, names in read_fused(folder):
         low, high = np.searchsorted(time_s, [start_s, end_s])
@@ -247,7 +247,7 @@ def _draw_ranges(
         top_km = min(farthest, 1.6 * top_km) if top_km else farthest
     top_km = max(1.05 * top_km, 0.1)
     axes.set_ylim(0.0, top_km)
-    over_time(axes, 0.0, duration_s, "true slant range (km)")
+    set_time_axis(axes, 0.0, duration_s, "true slant range (km)")
     if lines:
         draw_lines(axes, lines)
         handles.append(targets_key(len(lines) >= DENSE))
@@ -273,7 +273,7 @@ def _draw_ranges(
 def _draw_detections(axes: Any, detected: Detected, name: str, px_per_s: float) -> None:
     points = np.column_stack((detected.time_s[name], detected.range_m[name] / 1000))
     kept = [
-        rows[in_turns(points[rows, 0] * px_per_s, detected.styles, name, _GOLDEN * target)]
+        rows[alternate_marks(points[rows, 0] * px_per_s, detected.styles, name, _GOLDEN * target)]
         for target, rows in by_target(detected.target[name])
     ]
     if kept:

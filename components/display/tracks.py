@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from components.display.outcomes import NEAR_M, TABLE, distances, seen_by
-from components.display.recorded_rows import each_row_group, row_count
+from components.display.outcomes import NEAR_M, TABLE, distances, flights_seen_from
+from components.display.recorded_rows import iterate_row_groups, row_count
 from components.display.symbols import DENSE, Labels, draw_density
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import COVARIANCE, held
+from components.messages.state_tracks import COVARIANCE, is_held
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -92,7 +92,8 @@ class DrawnTracks:
         self.blocks = sorted(set(columns["block"].tolist()))
         #: What each tracker may see.
         self.seen_by = {
-            block: TargetsInFrame(seen_by(simulation, block), self.origin) for block in self.blocks
+            block: TargetsInFrame(flights_seen_from(simulation, block), self.origin)
+            for block in self.blocks
         }
         several = len(self.blocks) > 1
         for index, block in enumerate(self.blocks):
@@ -101,7 +102,7 @@ class DrawnTracks:
             for number in np.unique(columns["track"][mine]).tolist():
                 rows = np.flatnonzero(mine & (columns["track"] == number))
                 one = {name: columns[name][rows] for name in columns}
-                near = distances(one, slice(None), self.seen_by[block].at(one["state_s"]))
+                near = distances(one, slice(None), self.seen_by[block].positions_at(one["state_s"]))
                 # A comparison with nothing, as with what is not there, is false.
                 false = bool(len(targets)) and not bool((near < NEAR_M).any())
                 colour = _FALSE if false else COLOURS[turn % len(COLOURS)]
@@ -113,9 +114,9 @@ class DrawnTracks:
         """Read the tracks of a run's folder; None where none was confirmed."""
         path, rows = folder / f"{TABLE}.parquet", []
         thinning = Thinning(min(row_count(path), _MOST_ROWS))
-        for group in each_row_group(path, _COLUMNS, _MOST_ROWS):
+        for group in iterate_row_groups(path, _COLUMNS, _MOST_ROWS):
             group["block"] = np.array(group["block"].names, dtype=object)[group["block"].codes]
-            wanted = np.flatnonzero(held(group["track_status"]) & group["has_range"])
+            wanted = np.flatnonzero(is_held(group["track_status"]) & group["has_range"])
             kept = wanted[thinning(*(group[n][wanted] for n in ("tick", "block", "track")))]
             rows.append({n: group[n][kept] for n in _COLUMNS if n not in ("track_status", "tick")})
         if not any(len(part["block"]) for part in rows):
@@ -127,7 +128,7 @@ class DrawnTracks:
 def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
     """Draw tracks with their 95 % ellipses on the plan and by height, and write the PNG."""
     grid = np.linspace(*drawn.time_s, _MOST_POINTS)
-    positions, own = drawn.targets.at(grid), drawn.targets.position(drawn.own, grid)
+    positions, own = drawn.targets.positions_at(grid), drawn.targets.position(drawn.own, grid)
     with drawing(7.5, 8.4, path) as figure:
         plan, height = figure.subplots(2, 1, height_ratios=(3, 1))
         _flight(plan, height, grid, own, drawn.origin[2], {"color": _OWN, "linestyle": "--"})
@@ -139,7 +140,7 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
                 plan.scatter(position[1, :1] / 1e3, position[0, :1] / 1e3, s=6, color=_TRUTH)
         spreads = len(drawn.tracks) <= MOST_SPREADS
         for one in drawn.tracks:
-            _draw_one(plan, height, one, drawn.origin[2], spreads)
+            _draw_track(plan, height, one, drawn.origin[2], spreads)
         plan.set_aspect("equal", adjustable="datalim")
         plan.set_xlabel("east of the origin (km)")
         plan.set_ylabel("north of the origin (km)")
@@ -168,7 +169,7 @@ def _flight(
     height.plot(time_s, alt_m - ned_m[2], linewidth=0.7, zorder=1, **style)
 
 
-def _draw_one(
+def _draw_track(
     plan: Any, height: Any, track: DrawnTrack, origin_alt_m: float, spreads: bool
 ) -> None:
     every = track.columns

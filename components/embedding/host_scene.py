@@ -11,7 +11,7 @@ from dsa_des.block.component import Component, Context
 from dsa_des.block.registry import UnknownType, find
 from dsa_des.errors import Problem, SceneError, UsageError, did_you_mean
 from dsa_des.scene.block_table import Block
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.platforms import platforms_of
 from dsa_des.scene.scene import Scene, load_tables
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
@@ -46,7 +46,7 @@ def load_for_host(
 def _loaded(
     scene: Path | str, *, sets: Iterable[str], swaps: Iterable[str], seed: int | None
 ) -> Scene:
-    scene_file = read_scene_file(chosen_file(scene, "scene"))
+    scene_file = read_scene_file(find_input_file(scene, "scene"))
     blocks = scene_file.data.get("blocks", {})
     if isinstance(blocks, dict) and _NAME not in blocks and not _has_traffic(scene_file):
         blocks[_NAME] = {"type": HOST}
@@ -103,7 +103,7 @@ def refuse_other_instants(scene: Scene) -> None:
         Problem(
             str(scene.path), f"blocks.{name}.{key}",
             "needs to know where aircraft are between the calls of a host program, which says "
-            f"where they are at its calls only: set it to {_written(off)}", value,
+            f"where they are at its calls only: set it to {_toml_value(off)}", value,
         )
         for name, block in scene.blocks.items()
         for key, off in _NEEDS_FLIGHTS.items()
@@ -114,7 +114,7 @@ def refuse_other_instants(scene: Scene) -> None:
         raise SceneError(problems)
 
 
-def _written(value: bool | str) -> str:
+def _toml_value(value: bool | str) -> str:
     return repr(value) if isinstance(value, str) else str(value).lower()
 
 
@@ -132,7 +132,7 @@ def source_of(scene: Scene) -> str:
     return sources[0]
 
 
-def planes_known_to(scene: Scene) -> list[Plane]:
+def planes_in_scene(scene: Scene) -> list[Plane]:
     """Return the planes that a scene made for a host lists itself."""
     parameters: Any = scene.blocks[source_of(scene)].parameters
     return list(parameters.planes) if isinstance(parameters, HostTrafficParameters) else []

@@ -56,7 +56,7 @@ class HostTraffic(Component):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        self.roster = Roster.of([(plane.name, plane) for plane in parameters.planes])
+        self.roster = Roster.from_pairs([(plane.name, plane) for plane in parameters.planes])
 
     def offer(self, port: str) -> Roster:
         """Say what the targets are."""

@@ -10,10 +10,10 @@ from pydantic import ValidationError
 
 from components.aircraft.aircraft import Aircraft
 from components.embedding.host_traffic import Plane
-from components.embedding.states import numbers_in
+from components.embedding.states import to_numbers
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import Problem, SceneError, did_you_mean
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene_file import SceneFile, merge, read_scene_file
 
@@ -21,7 +21,7 @@ _CALL = "add_plane"
 
 
 def plane_of(name: str, aircraft: object, values: Mapping[str, Any]) -> Plane:
-    """Return the plane of a name, an aircraft, and what is said of it besides.
+    """Return a plane with a name, an aircraft type and further properties.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def plane_of(name: str, aircraft: object, values: Mapping[str, Any]) -> Plane:
     """
     described = SceneFile(Path(_CALL), {})
     if isinstance(aircraft, str | Path):
-        described = read_scene_file(chosen_file(aircraft))
+        described = read_scene_file(find_input_file(aircraft))
         # A file may say how an obstacle stays in place: here the host says where it is.
         _leave_out_flight(described.data)
     elif isinstance(aircraft, Aircraft):
@@ -92,7 +92,7 @@ class FixedPath:
         for label, rows in (("position", position), ("orientation", attitude)):
             if len(rows) not in (1, count):
                 raise ValueError(f"{label} has {len(rows)} rows: it must have 1 or {count}")
-        times = np.zeros(1) if times_s is None else numbers_in("times_s", times_s)
+        times = np.zeros(1) if times_s is None else to_numbers("times_s", times_s)
         if times.shape != (count,) and not (times_s is None and count == 1):
             shown = "missing" if times_s is None else f"of shape {times.shape}"
             raise ValueError(f"times_s is {shown}: it must give one time for each of {count} rows")
@@ -114,7 +114,7 @@ class FixedPath:
 
 
 def _rows(label: str, value: ArrayLike) -> FloatArray:
-    rows = np.atleast_2d(numbers_in(label, value))
+    rows = np.atleast_2d(to_numbers(label, value))
     if rows.ndim != 2 or rows.shape[1] != 3:
         raise ValueError(f"{label} has the shape {np.shape(value)}: it must be (3,) or (times, 3)")
     if not np.isfinite(rows).all():

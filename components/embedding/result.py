@@ -12,7 +12,7 @@ from components.messages.detections import Detections
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.message import Message
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 _NAN = math.nan
 _MOST_LINES = 9
@@ -111,7 +111,7 @@ class EncounterResult:
 
 def _line(one: Sighting) -> str:
     """Return one sighting as a line."""
-    name = shortened(one.name) or "false alarm"
+    name = shorten(one.name) or "false alarm"
     if not one.detected:
         return f"{name}: not detected"
     azimuth, elevation = math.degrees(one.azimuth_rad), math.degrees(one.elevation_rad)

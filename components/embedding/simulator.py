@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike
 from components.aircraft.aircraft import Aircraft
 from components.embedding.host_scene import (
     load_for_host,
-    planes_known_to,
+    planes_in_scene,
     refuse_other_instants,
     source_of,
     with_host,
 )
 from components.embedding.planes import FixedPath, number_of, plane_of
 from components.embedding.result import EncounterResult, Sighting, sightings_of
-from components.embedding.states import checked_rows, traffic_states
+from components.embedding.states import check_rows, traffic_states
 from components.messages.detections import Detections
 from components.messages.fused import FusedDetections
 from dsa_des.embed import HostDriven, Step
@@ -70,7 +70,7 @@ class Simulator:
         self.scene = load_for_host(scene, sets=sets, swaps=swaps, seed=seed, platform=platform)
         self._source = source_of(self.scene)
         refuse_other_instants(self.scene)
-        self._planes = planes_known_to(self.scene)
+        self._planes = planes_in_scene(self.scene)
         self._fixed: dict[int, FixedPath] = {}
         #: One chain for all planes, or one for each when the host calls plane by plane.
         self._chains: list[HostDriven] = []
@@ -236,7 +236,7 @@ class Simulator:
             self.start(plane_by_plane=wanted)
         if wanted != self._plane_by_plane:
             raise ValueError("a host calls for all planes at once or plane by plane, not both")
-        own = checked_rows("ownship", lla_ownship, att_ownship, 1, missing=False)
+        own = check_rows("ownship", lla_ownship, att_ownship, 1, missing=False)
         if plane is None:
             chain, chosen = self._chains[0], None
             free = self._free
@@ -244,14 +244,14 @@ class Simulator:
             number = number_of(plane, self.planes)
             chain, chosen = self._chains[number], [number]
             free = [] if number in self._fixed else [number]
-        moved = checked_rows("intruder", lla_intruder, att_intruder, len(free))
+        moved = check_rows("intruder", lla_intruder, att_intruder, len(free))
         tick = chain.tick_of(time_s)
         step = chain.due(tick)
         planes_asked = range(len(self._planes)) if chosen is None else chosen
         if step.scans:
             rows = moved
             if len(free) != len(planes_asked):
-                rows = self._placed(moved, free, planes_asked, tick / chain.ticks_per_s)
+                rows = self._plane_rows(moved, free, planes_asked, tick / chain.ticks_per_s)
             traffic: Any = chain.components[self._source]
             chain.run(step, traffic_states(own, rows, tick, traffic.roster, chosen))
         return self._result(step, planes_asked, chain.ticks_per_s)
@@ -288,7 +288,7 @@ class Simulator:
             step = chain.due(chain.tick_of(chain.next_scan_s()))
             chain.run(step, traffic_states(own, rows, step.tick, traffic.roster, None))
 
-    def _placed(
+    def _plane_rows(
         self, moved: Any, free: list[int], planes_asked: Sequence[int], time_s: float
     ) -> Any:
         """Return the rows of all planes: what the host said, and the fixed ones."""

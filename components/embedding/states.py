@@ -18,7 +18,7 @@ _LOW = np.array([-math.pi / 2, -LARGEST, LOWEST_ALTITUDE_M, -LARGEST, -LARGEST, 
 _HIGH = np.array([math.pi / 2, LARGEST, HIGHEST_ALTITUDE_M, LARGEST, LARGEST, LARGEST])
 
 
-def numbers_in(label: str, value: object) -> FloatArray:
+def to_numbers(label: str, value: object) -> FloatArray:
     """Return what a host gave as an array of numbers; ValueError names it where it is none."""
     mask = getattr(value, "mask", None)
     if mask is not None and np.any(mask):  # what a mask hides would be taken for a number
@@ -29,7 +29,7 @@ def numbers_in(label: str, value: object) -> FloatArray:
         raise ValueError(f"{label} is {shown_value(value)}: it must hold numbers") from error
 
 
-def checked_rows(
+def check_rows(
     who: str, lla: ArrayLike, att: ArrayLike, count: int, *, missing: bool = True
 ) -> FloatArray:
     """Return latitude, longitude, altitude, yaw, pitch, roll as rows (count, 6), checked.
@@ -44,7 +44,7 @@ def checked_rows(
         (f"lla_{who}", lla, slice(0, 3)),
         (f"att_{who}", att, slice(3, 6)),
     ):
-        array = numbers_in(label, value)
+        array = to_numbers(label, value)
         if array.shape != (count, 3) and not (array.shape == (3,) and count == 1):
             if array.size == 0 and count == 0:
                 continue
@@ -72,7 +72,7 @@ def checked_rows(
 def traffic_states(
     own: FloatArray, rows: FloatArray, tick: int, roster: Roster, chosen: list[int] | None
 ) -> TrafficStates:
-    """Return the traffic message of one instant, from rows of `checked_rows`.
+    """Return the traffic message of one instant, from rows of `check_rows`.
 
     `chosen` are the planes of the roster that the rows are; None for all.
     """

@@ -148,7 +148,9 @@ def _number(cell: object) -> float:
     return float(cell) if isinstance(cell, int | float) else math.nan
 
 
-def kept_rows(table: EncounterTable, wrong: Sequence[dict[int, str]], skip: bool) -> BoolArray:
+def select_good_rows(
+    table: EncounterTable, wrong: Sequence[dict[int, str]], skip: bool
+) -> BoolArray:
     """Return which rows are good, or raise UsageError with what is wrong with the others."""
     problems: dict[int, list[str]] = {}
     for some in wrong:
@@ -195,7 +197,7 @@ def show_risk(
     if cluster is not None:
         together = np.array([str(cell) for cell in content.column(cluster, "--cluster")])
     labels, wrong_by = _labels(content, by, edges)
-    kept = kept_rows(content, [wrong_n, wrong_m, wrong_w, wrong_by], skip_damaged)
+    kept = select_good_rows(content, [wrong_n, wrong_m, wrong_w, wrong_by], skip_damaged)
     n, m, w, labels = n[kept], m[kept], w[kept], labels[kept]
     together = None if together is None else together[kept]
     options: dict[str, Any] = {

@@ -21,7 +21,7 @@ from components.encounters.pairing import PairSampler, set_of_pairs
 from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.sampled_flight import SampledTrajectory
 from components.flights.sampled_segments import STRAIGHT_ROWS
-from components.formats.encounter_set import TRACKS, EncounterSet, flown_events
+from components.formats.encounter_set import TRACKS, EncounterSet, fly_events
 from components.formats.set_file import read_set
 from components.formats.text_rows import TrafficFile
 from components.geometry import enu_to_geodetic, line_of_sight
@@ -98,7 +98,7 @@ def _flights_of(keys: Sequence[tuple[EncounterSet, int, str]]) -> list[list[Samp
         width = max(1, CELLS_AT_ONCE // count)
         for first in range(0, len(numbers), width):
             some = numbers[first : first + width]
-            flown = _flown_alike([aircraft[k] for k in some], (table, first * count))
+            flown = _fly_alike([aircraft[k] for k in some], (table, first * count))
             made.update(zip(some, flown, strict=True))
     each = iter(range(len(aircraft)))
     return [[made[next(each)] for _ in mine] for mine in rows]
@@ -111,12 +111,12 @@ def _paths(aircraft: Sequence[_Craft]) -> tuple[FloatArray, ...]:
     """Return time (s), north, east and altitude (m) of aircraft known at the same times."""
     encounter_set, row, dynamics = aircraft[0]
     if encounter_set.kind != TRACKS:
-        return flown_events([(of, row) for of, row, _ in aircraft], dynamics)
+        return fly_events([(of, row) for of, row, _ in aircraft], dynamics)
     time_s, *position = encounter_set.path(row)
     return time_s, *(part[:, np.newaxis] for part in position)
 
 
-def _flown_alike(
+def _fly_alike(
     aircraft: Sequence[_Craft], place: tuple[FloatArray, int]
 ) -> list[SampledTrajectory]:
     time_s, north, east, altitude = _paths(aircraft)
@@ -126,7 +126,7 @@ def _flown_alike(
         reference_lat_deg=origin[0], reference_lon_deg=origin[1], reference_alt_m=0.0,
     )  # fmt: skip
     names = [encounter_set.names[row] for encounter_set, row, _ in aircraft]
-    return SampledTrajectory.together(names, time_s, lat, lon, altitude, place)
+    return SampledTrajectory.make_all(names, time_s, lat, lon, altitude, place)
 
 
 #: Beyond it nothing can meet; the plane in which encounters lie is far above the ground there.
@@ -235,7 +235,7 @@ class _EncounterTraffic(RecordedTraffic):
     @classmethod
     def choose(cls, parameters: Sequence[Any]) -> list[Encounter]:
         """Return the encounter of each of many blocks: its set and its index there."""
-        return [chosen_encounter(cls, p) for p in parameters]
+        return [encounter_of_parameters(cls, p) for p in parameters]
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
@@ -303,7 +303,7 @@ class ModelTraffic(_EncounterTraffic):
         super().prepare(parameters)
 
 
-def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
+def encounter_of_parameters(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     """Return the set of an encounter that a block's parameters name, and its index there."""
     if issubclass(cls, ModelTraffic):
         found: Encounter = _PAIRS[_pair_key(parameters)]
@@ -317,14 +317,14 @@ def chosen_encounter(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
 
 def _encounter_of(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
     """Return the set of an encounter where the scene puts it, and its index there."""
-    encounter_set, index = chosen_encounter(cls, parameters)
+    encounter_set, index = encounter_of_parameters(cls, parameters)
     at = parameters.lat_deg, parameters.lon_deg
     made_there = None in at or at == encounter_set.reference_deg
-    return (encounter_set if made_there else _moved(encounter_set, at)), index
+    return (encounter_set if made_there else _move_set(encounter_set, at)), index
 
 
 @lru_cache(maxsize=16)
-def _moved(encounter_set: EncounterSet, reference_deg: tuple[float, float]) -> EncounterSet:
+def _move_set(encounter_set: EncounterSet, reference_deg: tuple[float, float]) -> EncounterSet:
     """Return a set elsewhere, the same object each time: flights are kept by it."""
     return replace(encounter_set, reference_deg=reference_deg)
 

@@ -82,7 +82,7 @@ class ClosestApproachPassed(Component):
         starts = wake.instants.first_of_each
         numbers = wake.run[starts]
         shape = range_m.shape[1], len(numbers)
-        known = self._known.continued(
+        known = self._known.latest_or_new(
             KeyedTable(
                 replica=numbers,
                 range_m=np.full(shape, np.inf),
@@ -114,7 +114,7 @@ class ClosestApproachPassed(Component):
         ends = np.append(starts[1:], len(wake)) - 1
         now = {"range_m": now_m[ends].T, "since": since[ends].T, "seen": seen[ends].T}
         newer = KeyedTable(replica=numbers, **now)
-        self._known = self._known.after(numbers, newer, wake.first_run)
+        self._known = self._known.replace_runs(numbers, newer, wake.first_run)
         return RunEnd(wake.ticks[over], run=wake.run[over]) if over.any() else None
 
     def _ranges_m(self, states: TrafficStates) -> tuple[FloatArray, BoolArray]:

@@ -15,7 +15,13 @@ import numpy as np
 
 from components.arguments.units import FOOT_M, KNOT_M_S
 from components.encounters.sampling import EncounterDraws
-from components.flights.closest_geometry import SENSES, Approach, flown, in_plane, intruder_heading
+from components.flights.closest_geometry import (
+    SENSES,
+    Approach,
+    fly_paths,
+    intruder_heading,
+    project_to_plane,
+)
 from components.formats.encounter_set import (
     LARGEST_WEIGHT,
     NAMES,
@@ -158,7 +164,7 @@ class _Recipes:
         origin = float(at[0]), float(at[1])
         courses = None
         if self.tables.get("courses", "one") == "every":
-            there = [(k, c) for k, one in enumerate(every) for c in _courses_there(one)]
+            there = [(k, c) for k, one in enumerate(every) for c in _available_courses(one)]
             every, kinds = [every[k] for k, _ in there], [kinds[k] for k, _ in there]
             courses = [course for _, course in there]
             if not every:
@@ -204,7 +210,7 @@ class _Recipes:
         return float(value)
 
 
-def _courses_there(one: Mapping[str, Any]) -> list[int]:
+def _available_courses(one: Mapping[str, Any]) -> list[int]:
     """Return which of the two courses there are for a combination."""
     speeds = np.array([one["own_speed"]]), np.array([one["intruder_speed"]])
     both = intruder_heading(np.zeros(1), *speeds, np.array([one["bearing"]]))
@@ -219,12 +225,12 @@ def _is_number(value: Any) -> bool:
 def read_made(path: Path) -> EncounterSet:
     """Return the encounters of a table."""
     try:
-        return made_set(read_recipe(str(path)))
+        return make_set(read_recipe(str(path)))
     except UsageError as error:
         raise EncounterSetError(str(error)) from None
 
 
-def made_set(recipe: Recipe) -> EncounterSet:
+def make_set(recipe: Recipe) -> EncounterSet:
     """Return the encounters of a recipe, combination after combination."""
     total = recipe.count * len(recipe.fixed)
     combination = np.repeat(np.arange(len(recipe.fixed)), recipe.count)
@@ -233,7 +239,7 @@ def made_set(recipe: Recipe) -> EncounterSet:
     values, course = np.zeros((len(names), total)), np.full(total, np.nan)
     left = np.arange(total)
     for attempt in range(_TRIES):
-        drawn = draws.few(left, len(names) + 1, attempt)
+        drawn = draws.uniform_of_few(left, len(names) + 1, attempt)
         for k, name in enumerate(names):
             ends = [recipe.fixed[c][name] for c in combination[left]]
             low, high = np.array([e if isinstance(e, tuple) else (e, e) for e in ends]).T
@@ -243,7 +249,7 @@ def made_set(recipe: Recipe) -> EncounterSet:
         )
         approach = _approach(recipe, dict(zip(names, values[:, left], strict=True)), course[left])
         possible = ~np.isnan(course[left])
-        possible &= flown(approach, np.zeros(len(left)), np.zeros(1))[3]
+        possible &= fly_paths(approach, np.zeros(len(left)), np.zeros(1))[3]
         free = np.array([any(isinstance(v, tuple) for v in recipe.fixed[c].values())
                          for c in combination[left]])  # fmt: skip
         stuck = left[~possible & ~free]
@@ -256,7 +262,7 @@ def made_set(recipe: Recipe) -> EncounterSet:
             break
     else:
         _refuse(recipe, int(left[0]), int(combination[left[0]]), bool(np.isnan(course[left[0]])))
-    return _as_set(recipe, dict(zip(names, values, strict=True)), course)
+    return _columns_to_set(recipe, dict(zip(names, values, strict=True)), course)
 
 
 def _refuse(recipe: Recipe, number: int, combination: int, no_course: bool) -> None:
@@ -299,13 +305,13 @@ def _approach(recipe: Recipe, v: dict[str, FloatArray], course: FloatArray) -> A
     )
 
 
-def _as_set(recipe: Recipe, v: dict[str, FloatArray], course: FloatArray) -> EncounterSet:
+def _columns_to_set(recipe: Recipe, v: dict[str, FloatArray], course: FloatArray) -> EncounterSet:
     total = len(course)
     time_s = np.append(np.arange(0.0, recipe.duration_s, 1.0), recipe.duration_s)
-    lat, lon, alt, _ = flown(_approach(recipe, v, course), v["closest"], time_s)
+    lat, lon, alt, _ = fly_paths(_approach(recipe, v, course), v["closest"], time_s)
     # Rows of the file: both aircraft of each encounter in turn.
     lat, lon, alt = (x.transpose(1, 0, 2).reshape(-1) for x in (lat, lon, alt))
-    north, east = in_plane(lat, lon, recipe.at_deg)
+    north, east = project_to_plane(lat, lon, recipe.at_deg)
     off = np.degrees(course - v["own_heading"]) % 360.0
     return EncounterSet(
         str(recipe.path),

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from components.arguments.units import FOOT_M
-from components.encounters.made_encounters import made_set, read_recipe
+from components.encounters.made_encounters import make_set, read_recipe
 from components.encounters.model import EncounterModel
 from components.encounters.model_file import ModelFileError, read_model
 from components.encounters.pair_densities import (
@@ -21,24 +21,29 @@ from components.encounters.pair_densities import (
 from components.encounters.pairing import (
     COURSES,
     PairSampler,
-    are_kept,
-    drawn_course,
+    draw_courses,
+    is_pair_accepted,
     set_of_pairs,
 )
 from components.encounters.sampling import EncounterDraws, SampledTracks, TrackSampler
-from components.encounters.track_rules import TrackError, TrackRules, accepted_tracks
+from components.encounters.track_rules import TrackError, TrackRules, sample_accepted_tracks
 from components.formats.encounter_set import NAMES, EncounterSet
 from components.formats.public_formats import SET, set_of_tracks
 from components.formats.recorded.known_kinds import record
-from components.formats.recorded.paired_tracks import TrackWindows, apart, is_flying, turned
+from components.formats.recorded.paired_tracks import (
+    TrackWindows,
+    is_flying,
+    place_other_path,
+    turn_path,
+)
 from components.formats.set_file import is_origin, write_set
 from components.formats.text_rows import TrafficFileError
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.errors.budgets import foreseen
 from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
-from dsa_des.files.output_file import check_ending, check_file, streamed
-from dsa_des.files.output_names import named, reason_of
+from dsa_des.files.output_file import check_ending, check_file, stream_file
+from dsa_des.files.output_names import reason_of, user_path
 from dsa_des.terminal.terminal import say
 
 #: Purpose of the draws: without rejections raw tracks and flown ones are the same.
@@ -59,7 +64,7 @@ def sample_tracks(
 ) -> None:
     """Write the tracks that the command line asks for."""
     encounter_model = open_model(model)
-    path = named(out)
+    path = user_path(out)
     check_file(path)
     seconds = int(duration_s)
     if seconds != duration_s:
@@ -72,7 +77,7 @@ def sample_tracks(
         say(f"note: {long}", err=True)
     batches = _raw(encounter_model, seed, range(first, first + count), seconds)
     if not raw:
-        batches = _flown(encounter_model, seed, range(first, first + count), seconds, dynamics)
+        batches = _fly_tracks(encounter_model, seed, range(first, first + count), seconds, dynamics)
     try:
         rows = _write(path, batches)
     except TrackError as error:
@@ -122,13 +127,13 @@ def _variables(model: EncounterModel, tracks: SampledTracks, seconds: int) -> _C
     return columns
 
 
-def _flown(
+def _fly_tracks(
     model: EncounterModel, seed: int, numbers: range, seconds: int, dynamics: str
 ) -> Iterator[_Columns]:
     """Give accepted tracks with the positions they fly through, once per second."""
     sampler = TrackSampler(model, EncounterDraws(seed, TRACKS))
     rules = TrackRules(model)
-    for tracks, flown in accepted_tracks(sampler, rules, numbers, seconds, dynamics):
+    for tracks, flown in sample_accepted_tracks(sampler, rules, numbers, seconds, dynamics):
         each = round(1.0 / flown.step_s)
         columns = _variables(model, tracks, seconds)
         for name, values in (
@@ -150,7 +155,7 @@ def _write(path: Path, batches: Iterator[_Columns]) -> int:
 
     rows = 0
     plain = pa_csv.WriteOptions(include_header=False)
-    with streamed(path) as file:
+    with stream_file(path) as file:
         for columns in batches:
             if not rows:
                 header = io.StringIO()
@@ -202,7 +207,7 @@ def generate_set(
         )
     own = open_model(model)
     intruder = own if intruder_model is None else open_model(intruder_model)
-    path = named(out)
+    path = user_path(out)
     check_ending(path, [SET])
     check_file(path)
     rules = _rules(horizontal, vertical)
@@ -246,7 +251,7 @@ def _write_pairs(
     out: str,
 ) -> None:
     """Write a set of pairs of recorded flights."""
-    path = named(out)
+    path = user_path(out)
     check_ending(path, [SET])
     check_file(path)
     rules = _rules(horizontal, vertical)
@@ -293,29 +298,31 @@ def _pair(
     who = np.array([number])
     for attempt in range(_MOST_TRIES):
         drawn = draws.uniform(who, 4 + 2 * COURSES, attempt)
-        (first, own), (second, other) = (windows.drawn(float(share[0])) for share in drawn[:2])
+        (first, own), (second, other) = (
+            windows.draw_window(float(share[0])) for share in drawn[:2]
+        )
         speeds = [windows.velocity(path) for path in (own, other)]
         if first == second or not all(map(is_flying, speeds)):
             continue
         level = [np.array([np.hypot(v[0], v[1])]) / FOOT_M for v in speeds]
         climb = np.array([speeds[1][2] - speeds[0][2]]) / FOOT_M
-        course = drawn_course(level[0], level[1], climb, drawn[4:])
+        course = draw_courses(level[0], level[1], climb, drawn[4:])
         density, accept = rules.horizontal_ft, rules.vertical_ft
-        miss_ft = density.where_area_is(drawn[2] * density.area)
-        up_ft = accept.where_area_is(drawn[3] * accept.area)
+        miss_ft = density.quantile_of_area(drawn[2] * density.area)
+        up_ft = accept.quantile_of_area(drawn[3] * accept.area)
         north, east = level[1] * np.cos(course) - level[0], level[1] * np.sin(course)
         relative = np.maximum(np.hypot(north, east), 1e-9)
         place_m = miss_ft * FOOT_M * np.array([east, -north]) / relative
-        own = turned(own, speeds[0], 0.0)
-        other = turned(other, speeds[1], float(course[0]))
-        other = apart(
+        own = turn_path(own, speeds[0], 0.0)
+        other = turn_path(other, speeds[1], float(course[0]))
+        other = place_other_path(
             own, other, rules.closest_s, (float(place_m[0, 0]), float(place_m[1, 0])),
             float(up_ft[0]) * FOOT_M,
         )  # fmt: skip
         paths_ft = np.stack([own, other], axis=1)[..., np.newaxis] / FOOT_M
-        if are_kept(rules, list(paths_ft), miss_ft, up_ft)[0]:
-            q = density.at(miss_ft) / density.area
-            chance = accept.at(up_ft) / accept.heights.max()
+        if is_pair_accepted(rules, list(paths_ft), miss_ft, up_ft)[0]:
+            q = density.value_at(miss_ft) / density.area
+            chance = accept.value_at(up_ft) / accept.heights.max()
             weight = speeds_over_directions(level[0], level[1], climb) / (2.0 * REFERENCE_FT)
             return float((weight / q / chance)[0]), (own, other), attempt + 1
     raise UsageError(
@@ -344,10 +351,10 @@ def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None)
 
 def _write_made(made: str, out: str) -> None:
     recipe = read_recipe(made)
-    path = named(out)
+    path = user_path(out)
     check_ending(path, [SET])
     check_file(path)
-    encounters = made_set(recipe)
+    encounters = make_set(recipe)
     write_set(path, {"made_by": "hand", "seed": recipe.seed}, [encounters])
     say(f"{path}: {len(encounters)} encounters of {recipe.duration_s:g} s")
 

@@ -34,23 +34,23 @@ class StepDensity:
             raise ValueError("proportions must be numbers above 0")
 
     @property
-    def _summed(self) -> FloatArray:
+    def _cumulative_area(self) -> FloatArray:
         return np.concatenate([[0.0], np.cumsum(self.heights * np.diff(self.edges))])
 
     @property
     def area(self) -> float:
         """Integral over all of it."""
-        return float(self._summed[-1])
+        return float(self._cumulative_area[-1])
 
-    def area_to(self, x: FloatArray) -> FloatArray:
+    def integral_to(self, x: FloatArray) -> FloatArray:
         """Return the integral from the first edge to x."""
-        return np.interp(x, self.edges, self._summed)
+        return np.interp(x, self.edges, self._cumulative_area)
 
-    def where_area_is(self, area: FloatArray) -> FloatArray:
+    def quantile_of_area(self, area: FloatArray) -> FloatArray:
         """Return the x up to which the integral is as large."""
-        return np.interp(area, self._summed, self.edges)
+        return np.interp(area, self._cumulative_area, self.edges)
 
-    def at(self, x: FloatArray) -> FloatArray:
+    def value_at(self, x: FloatArray) -> FloatArray:
         """Return the value at x; outside the edges that of the nearest step."""
         index = np.searchsorted(self.edges, x, side="right") - 1
         result: FloatArray = self.heights[np.clip(index, 0, len(self.heights) - 1)]
@@ -65,17 +65,17 @@ def horizontal_density(edges_ft: FloatArray, shares: FloatArray) -> StepDensity:
     """Return the density of signed horizontal miss distances with these shares between edges."""
     wide = np.diff(edges_ft) if len(edges_ft) == len(shares) + 1 else 1.0
     with np.errstate(divide="ignore", invalid="ignore"):  # steps of no width are refused
-        return _about_zero(edges_ft, shares / wide)
+        return _density_about_zero(edges_ft, shares / wide)
 
 
 def vertical_density(edges_ft: FloatArray, chances: FloatArray) -> StepDensity:
     """Return the chances with which vertical miss distances between edges are accepted."""
     if not (chances <= 1.0).all():
         raise ValueError("chances must lie above 0 and be 1 at most")
-    return _about_zero(edges_ft, chances)
+    return _density_about_zero(edges_ft, chances)
 
 
-def _about_zero(edges_ft: FloatArray, heights: FloatArray) -> StepDensity:
+def _density_about_zero(edges_ft: FloatArray, heights: FloatArray) -> StepDensity:
     if not (np.abs(edges_ft) <= FARTHEST_FT).all():
         raise ValueError(f"edges must lie within ±{FARTHEST_FT:g} ft")
     density = StepDensity(edges_ft, heights)

@@ -28,7 +28,7 @@ from components.encounters.model import EncounterModel
 from components.encounters.pair_densities import REFERENCE_FT, PairingRules, speeds_over_directions
 from components.encounters.sampling import EncounterDraws, Ints, TrackSampler
 from components.encounters.track_rules import Commands, TrackError, TrackRules
-from components.flights.point_mass import fly_euler, summed
+from components.flights.point_mass import cumulative_sums, fly_euler
 from components.formats.encounter_set import EVENTS, NAMES, EncounterSet, geometry_class
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
@@ -124,7 +124,7 @@ class PairSampler:
                     f"{own} and {intruder}: pair {wanted[left[0]]} was rejected {_MOST_ATTEMPTS} "
                     "times: the two models do not meet"
                 )
-        together = _together(parts)
+        together = _concatenate(parts)
         return together.take(np.argsort(together.numbers))
 
     def _starts(self, numbers: IntArray, attempts: IntArray) -> tuple[IntArray, AnyArray, AnyArray]:
@@ -151,7 +151,7 @@ class PairSampler:
         good &= (low - climbs < reach) & (high + climbs > -reach)
         accept = self.rules.vertical_ft
         bound = np.minimum(1.0, accept.area / accept.heights.max() / width[1 - narrow, here])
-        drawn = self._draws.few(numbers, 1, attempts)[0]
+        drawn = self._draws.uniform_of_few(numbers, 1, attempts)[0]
         hopeful = np.flatnonzero(good & (drawn < bound))
         return hopeful, narrow[hopeful], bound[hopeful]
 
@@ -168,7 +168,7 @@ class PairSampler:
         own, narrow, bound = own.take(rows), narrow[rows], bound[rows]
         other = self._flight(1, numbers[rows], attempts[rows])
         both = own, other
-        drawn = self._draws.few(numbers[rows], _COURSES_FROM, attempts[rows])
+        drawn = self._draws.uniform_of_few(numbers[rows], _COURSES_FROM, attempts[rows])
         here = np.arange(len(rows))
         climbed = np.array([f.commands.climb_ft_s[:cpa].sum(axis=0) for f in both])
         altitude = np.array([f.commands.altitude_ft for f in both])
@@ -179,27 +179,29 @@ class PairSampler:
         low, high = (layers[wide, k, here] + climbed[wide, here] - at_cpa for k in (0, 1))
         low, high = np.where(wide == 1, low, -high), np.where(wide == 1, high, -low)
         accept = rules.vertical_ft
-        below = accept.area_to(low)
-        area = accept.area_to(high) - below
+        below = accept.integral_to(low)
+        area = accept.integral_to(high) - below
         width = layers[wide, 1, here] - layers[wide, 0, here]
         good = drawn[1] * width * bound * accept.heights.max() < area
-        vertical = accept.where_area_is(below + drawn[2] * area)
+        vertical = accept.quantile_of_area(below + drawn[2] * area)
         sign = np.where(wide == 1, 1.0, -1.0)
         altitude[wide, here] = at_cpa + sign * vertical - climbed[wide, here]
         good &= other.flies
         done = good.nonzero()[0]
         for k, flight in enumerate(both):
             climb = flight.commands.climb_ft_s[:, done]
-            done = done[self._rules[k].inside(summed(altitude[k, done], climb))]
+            done = done[self._rules[k].is_inside(cumulative_sums(altitude[k, done], climb))]
         if not len(done):
             return done, done, None
         commands = [f.commands.take(done) for f in both]
         for k, c in enumerate(commands):
             c.altitude_ft[:] = altitude[k, done]
         rows = rows[done]
-        more = self._draws.few(numbers[rows], _COURSES_FROM + 2 * COURSES, attempts[rows])
-        pairs = self._paired(numbers[rows], attempts[rows], commands, vertical[done], more[3:])
-        kept = self._kept(pairs).nonzero()[0]
+        more = self._draws.uniform_of_few(
+            numbers[rows], _COURSES_FROM + 2 * COURSES, attempts[rows]
+        )
+        pairs = self._fly_pairs(numbers[rows], attempts[rows], commands, vertical[done], more[3:])
+        kept = self._is_accepted(pairs).nonzero()[0]
         return rows[kept], kept, pairs
 
     def _flight(self, which: int, numbers: IntArray, attempts: IntArray) -> "_Flight":
@@ -207,11 +209,11 @@ class PairSampler:
         rules = self._rules[which]
         tracks = self._tracks[which].sample(numbers, self.rules.duration_s, attempts)
         commands = rules.commands(tracks)
-        speed = summed(commands.speed_ft_s, commands.acceleration_ft_s2)
+        speed = cumulative_sums(commands.speed_ft_s, commands.acceleration_ft_s2)
         good = rules.flies(tracks, commands.climb_ft_s, speed)
         return _Flight(commands, good, *rules.layers_ft(tracks))
 
-    def _paired(
+    def _fly_pairs(
         self,
         numbers: IntArray,
         attempts: IntArray,
@@ -227,9 +229,9 @@ class PairSampler:
         ]
         first, second = (f.speed_ft_s[cpa] for f in flown)
         climb = flown[1].climb_ft_s[cpa] - flown[0].climb_ft_s[cpa]
-        course = drawn_course(first, second, climb, drawn[1:])
+        course = draw_courses(first, second, climb, drawn[1:])
         density = self.rules.horizontal_ft
-        horizontal = density.where_area_is(drawn[0] * density.area)
+        horizontal = density.quantile_of_area(drawn[0] * density.area)
         north = second * np.cos(course) - first
         east = second * np.sin(course)
         relative = np.maximum(np.hypot(north, east), 1e-9)
@@ -246,8 +248,8 @@ class PairSampler:
             easts.append(at[1] + n * sin + e * cos)
             headings.append(f.heading_rad + turned)
         accept = self.rules.vertical_ft
-        chance = accept.at(vertical) / accept.heights.max()
-        q = density.at(horizontal) / density.area
+        chance = accept.value_at(vertical) / accept.heights.max()
+        q = density.value_at(horizontal) / density.area
         weight = speeds_over_directions(first, second, climb) / (2.0 * REFERENCE_FT) / q / chance
         return Pairs(
             numbers, weight, horizontal, vertical, course, attempts,
@@ -257,14 +259,14 @@ class PairSampler:
             np.array([c.acceleration_ft_s2 for c in commands]),
         )  # fmt: skip
 
-    def _kept(self, pairs: Pairs) -> BoolArray:
-        return are_kept(
+    def _is_accepted(self, pairs: Pairs) -> BoolArray:
+        return is_pair_accepted(
             self.rules, (pairs.north_ft, pairs.east_ft, pairs.up_ft), pairs.horizontal_ft,
             pairs.vertical_ft,
         )  # fmt: skip
 
 
-def are_kept(
+def is_pair_accepted(
     rules: PairingRules,
     paths_ft: Sequence[FloatArray],
     horizontal_ft: FloatArray,
@@ -304,12 +306,12 @@ class _Flight:
         return _Flight(commands, self.flies[rows], self.low_ft[rows], self.high_ft[rows])
 
 
-def _together(parts: list[Pairs]) -> Pairs:
+def _concatenate(parts: list[Pairs]) -> Pairs:
     names = vars(parts[0])
     return Pairs(**{n: np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names})
 
 
-def drawn_course(
+def draw_courses(
     first: FloatArray, second: FloatArray, climb: FloatArray, drawn: FloatArray
 ) -> FloatArray:
     """Return courses with a density that goes with the relative speed, by rejection.

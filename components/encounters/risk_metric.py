@@ -17,7 +17,7 @@ from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class,
 from components.metrics.losses import meeting_deg, nominal_geometry
 from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import traffic_block
-from components.well_clear.missed_cylinder import Missed, led_into, widened
+from components.well_clear.missed_cylinder import Missed, probability_led_into, widen_cylinders
 from components.well_clear.plane_pairs import Meetings, meetings
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.scene.block_table import Block
@@ -45,7 +45,7 @@ def encounters_of(group: Group) -> list[Encounter]:
     """Return the encounter of every replica, its set and its index there, made together."""
     block = traffic_block(group.scene)
     cls: Any = block.cls
-    return group.once("encounters", lambda: cls.choose(group.parameters_of(block.name)))
+    return group.cached("encounters", lambda: cls.choose(group.parameters_of(block.name)))
 
 
 class EncounterWeight(Metric):
@@ -169,7 +169,7 @@ class RiskRatios(Mitigated):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all but the ratios for every replica."""
         result = dict(super().measure(group))
-        result |= self._unsteered(group, result)
+        result |= self._weights_and_classes(group, result)
         if self.p.needless:
             commanded = np.zeros(len(group))
             commanded[list(self.manoeuvres(group))] = 1.0
@@ -185,7 +185,7 @@ class RiskRatios(Mitigated):
 
     def nominal(self, group: Group) -> dict[str, AnyArray]:
         """Return both events without manoeuvres; flights tell where the plane is not sure."""
-        meeting = met_in_plane(group, self.p)
+        meeting = meetings_in_plane(group, self.p)
         if meeting is None:
             return super().nominal(group)
         result = _events_of(meeting)
@@ -197,15 +197,15 @@ class RiskRatios(Mitigated):
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
         """Return what no manoeuvre changes, and the geometry of the closest approach."""
-        meeting, sizes_m = met_in_plane(group, self.p), self.p.sizes_m
+        meeting, sizes_m = meetings_in_plane(group, self.p), self.p.sizes_m
         if meeting is None:
             result = self._of_nominal(group)
-            geometry = partial(nominal_geometry, widened(sizes_m))
+            geometry = partial(nominal_geometry, widen_cylinders(sizes_m))
             closest, *misses_m = np.split(self.of_flights(group, geometry, steered=False), [7, 9])
         else:
             closest, result = meeting.closest, self._of_meeting(meeting)
             misses_m = [meeting.beside_m, meeting.above_m]
-            unsure = np.flatnonzero(meeting.unsure.any(axis=0) | self._between_classes(meeting))
+            unsure = np.flatnonzero(meeting.unsure.any(axis=0) | self._is_class_unsure(meeting))
             if len(unsure):
                 few = Group(group.scene, [group.replicas[k] for k in unsure.tolist()], (), {})
                 for name, column in self._of_nominal(few).items():
@@ -229,7 +229,9 @@ class RiskRatios(Mitigated):
         for k, event in enumerate(("well_clear_lost", "nmac")):
             there = result[f"{event}_nominal"] > 0.0
             missed = Missed(values[1], values[2], misses_m[0][k], misses_m[1][k])
-            induced = _INDUCED * rushed * led_into(sizes_m[k], missed, climbs=self._climbs)
+            induced = (
+                _INDUCED * rushed * probability_led_into(sizes_m[k], missed, climbs=self._climbs)
+            )
             stays = _STAYS + (1.0 - _STAYS) * late
             result[expected_column(f"{event}_mitigated")] = np.where(there, stays, induced)
         alone = np.maximum(np.nan_to_num(clear, nan=np.inf), 1.0)
@@ -241,16 +243,16 @@ class RiskRatios(Mitigated):
         return {**super().nominal(group), **self._classes(group)}
 
     def _of_meeting(self, meeting: Meetings) -> dict[str, AnyArray]:
-        """Return the same of paths in the plane, as far as these are sure."""
-        return _events_of(meeting) | self._named(*meeting.closest[5:])
+        """Return events and classes by straight paths in the plane, where these decide."""
+        return _events_of(meeting) | self._class_columns(*meeting.closest[5:])
 
-    def _between_classes(self, meeting: Meetings) -> BoolArray:
+    def _is_class_unsure(self, meeting: Meetings) -> BoolArray:
         """Return of which runs the plane does not tell the classes."""
         if not self.p.by:
             return np.zeros_like(meeting.unsure_angles)
         low, high = meeting.angles_deg[:, 0], meeting.angles_deg[:, 1]
         unsure = meeting.unsure_angles | (high - low > _WIDE_DEG).any(axis=0)
-        edges = zip(*(self._named(*angles).values() for angles in (low, high)), strict=True)
+        edges = zip(*(self._class_columns(*angles).values() for angles in (low, high)), strict=True)
         for one, other in edges:
             unsure |= one != other
         return unsure
@@ -259,9 +261,11 @@ class RiskRatios(Mitigated):
         """Return the classes of encounters, as without manoeuvres."""
         if not self.p.by:
             return {}
-        return self._named(*self.of_flights(group, meeting_deg, steered=False))
+        return self._class_columns(*self.of_flights(group, meeting_deg, steered=False))
 
-    def _named(self, course_deg: FloatArray, bearing_deg: FloatArray) -> dict[str, AnyArray]:
+    def _class_columns(
+        self, course_deg: FloatArray, bearing_deg: FloatArray
+    ) -> dict[str, AnyArray]:
         """Return the classes by courses and bearings; None where nobody is met."""
         result: dict[str, AnyArray] = {}
         for by in self.p.by:
@@ -271,7 +275,9 @@ class RiskRatios(Mitigated):
             result[f"encounter_{by}"] = column
         return result
 
-    def _unsteered(self, group: Group, known: Mapping[str, AnyArray]) -> dict[str, AnyArray]:
+    def _weights_and_classes(
+        self, group: Group, known: Mapping[str, AnyArray]
+    ) -> dict[str, AnyArray]:
         """Return weight and classes, and whether well clear is kept, as without manoeuvres."""
         result: dict[str, AnyArray] = {}
         if self.p.needless:
@@ -289,7 +295,7 @@ def _events_of(meeting: Meetings) -> dict[str, AnyArray]:
 
 
 def may_climb(block: Block) -> bool:
-    """Return whether a block that steers may command another altitude, as far as it says so."""
+    """Return whether a steering block declares that it may command another altitude."""
     asked = getattr(block.cls, "may_climb", None)
     return asked is None or bool(asked(block.parameters))
 
@@ -301,8 +307,8 @@ def side_of(bearing_deg: FloatArray) -> AnyArray:
     return result
 
 
-def met_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
-    """Return how runs meet as far as the plane tells; None where it cannot tell of any."""
+def meetings_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
+    """Return the meetings of runs computed in the plane; None where no run can be computed so."""
     block, scene = traffic_block(group.scene), group.scene
     parameters = group.parameters_of(block.name)
     one = parameters[0]
@@ -316,4 +322,4 @@ def met_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
     ):
         return None
     paths, end_s = pair_paths(encounters_of(group), one.dynamics), float(scene.duration_s or "inf")
-    return meetings(paths, len(group), end_s, p.sizes_m, widened(p.sizes_m))
+    return meetings(paths, len(group), end_s, p.sizes_m, widen_cylinders(p.sizes_m))

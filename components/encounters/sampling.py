@@ -33,7 +33,7 @@ class EncounterDraws:
         self._generator = np.random.Philox(key=0)
         self._numbers = np.random.Generator(self._generator)
 
-    def few(self, numbers: Ints, count: int, attempts: Ints | int = 0) -> FloatArray:
+    def uniform_of_few(self, numbers: Ints, count: int, attempts: Ints | int = 0) -> FloatArray:
         """Return draws as `uniform` does, others than those, faster where they are a handful."""
         number = np.asarray(numbers, dtype=np.uint64)
         attempt = np.asarray(attempts, dtype=np.uint64)
@@ -90,7 +90,7 @@ class SampledTracks:
     left: FloatArray
     changing: FloatArray
 
-    def put(self, indices: IntArray, others: "SampledTracks", which: BoolArray) -> None:
+    def replace(self, indices: IntArray, others: "SampledTracks", which: BoolArray) -> None:
         """Put some of other tracks at these indices."""
         self.initial[:, indices] = others.initial[:, which]
         self.initial_bins[:, indices] = others.initial_bins[:, which]
@@ -116,12 +116,12 @@ class TrackSampler:
         """Return tracks by their numbers."""
         model = self.model
         variables, changing = len(model.labels), len(model.dynamic)
-        uniform = self._draws.few(numbers, variables, attempts)
+        uniform = self._draws.uniform_of_few(numbers, variables, attempts)
         bins: IntArray = np.zeros((variables, len(numbers)), dtype=np.int64)
         values, left = np.zeros((2, variables, len(numbers)))
         for index in model.initial.order:
             node = model.initial.nodes[index]
-            mine, left[index] = _drawn(node, node.column(bins), uniform[index])
+            mine, left[index] = _draw_bins(node, node.column(bins), uniform[index])
             bins[index] = mine
             values[index] = self._low[index][mine] + self._width[index][mine] * left[index]
         over_time = np.empty((seconds + 1, changing, len(numbers)))
@@ -134,7 +134,7 @@ class TrackSampler:
         count = seconds * changing
         drawn = self._draws.uniform(numbers, count, attempts) if count else np.empty((0, 0))
         rows = drawn.reshape(seconds, changing, len(numbers))
-        fixed = [step.fixed(now) for step in self._steps]
+        fixed = [step.static_columns(now) for step in self._steps]
         for second, row in enumerate(rows, start=1):
             for step, column in zip(self._steps, fixed, strict=True):
                 step.take(now, column, row, over_time[second - 1], over_time[second])
@@ -170,7 +170,7 @@ class _Step:
             each = np.where(empty, 1.0, np.where(chance > 0.0, 1.0 / chance, 1.0))
         self._each = each.reshape(-1)
 
-    def fixed(self, now: IntArray) -> IntArray:
+    def static_columns(self, now: IntArray) -> IntArray:
         """Return what static parents add to the columns, which stays for all of a track."""
         result: IntArray = np.zeros(now.shape[1], dtype=np.int64)
         for parent, stride in self._static:
@@ -203,12 +203,14 @@ class _Step:
             value[anew] = self._low[bins] + self._width[bins] * (left[anew] / self._rate)
         moved = ((left < 0.0) | (left >= 1.0)).nonzero()[0]
         if len(moved):
-            bins, rest = _drawn(node, column[moved], u[moved])
+            bins, rest = _draw_bins(node, column[moved], u[moved])
             now[self.index, moved] = bins
             value[moved] = self._low[bins] + self._width[bins] * rest
 
 
-def _drawn(node: NetworkNode, column: IntArray, uniform: FloatArray) -> tuple[IntArray, FloatArray]:
+def _draw_bins(
+    node: NetworkNode, column: IntArray, uniform: FloatArray
+) -> tuple[IntArray, FloatArray]:
     """Return the bins into which draws fall, and what is left of them within the bin, [0, 1)."""
     edges, at = node.flat_edges, column * (node.size + 1)
     bins: IntArray = np.zeros(len(column), dtype=np.int64)

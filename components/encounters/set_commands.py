@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from components.encounters.encounter_tables import kept_rows, numbers, read_table
+from components.encounters.encounter_tables import numbers, read_table, select_good_rows
 from components.encounters.model_commands import check_origin
 from components.encounters.splitting import expected_copies, nearness, split_set
 from components.formats.encounter_set import EncounterSet, geometry_class
@@ -20,7 +20,7 @@ from dsa_des.errors import OutputError, UsageError
 from dsa_des.errors.budgets import refuse_samples
 from dsa_des.files.input_files import InputFileError, resolve_home
 from dsa_des.files.output_file import PICTURES, check_ending, check_file, write_file
-from dsa_des.files.output_names import named, reason_of
+from dsa_des.files.output_names import reason_of, user_path
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
 
@@ -35,7 +35,7 @@ def convert_sets(
     """Write what is in some files as one set, or as a file of waypoints."""
     if at is not None:
         check_origin(at)
-    path = named(out)
+    path = user_path(out)
     if path.suffix.lower() not in (SET, *WAYPOINTS):
         raise UsageError(f"--out {out}: must end in {SET}, or in {' or '.join(WAYPOINTS)}")
     check_file(path)
@@ -83,7 +83,7 @@ def _by_encounter(
     table = read_table(text)
     number, wrong = numbers(table, "encounter", options[0], flag=False)
     value, also = numbers(table, column, options[1], flag=False)
-    kept_rows(table, [wrong, also], skip=False)
+    select_good_rows(table, [wrong, also], skip=False)
     known: dict[int, float] = {}
     for n, v in zip(number.astype(np.int64).tolist(), value.tolist(), strict=True):
         known[n] = min(v, known.get(n, math.inf)) if least else v
@@ -120,7 +120,7 @@ def closest_approaches(encounters: EncounterSet, indices: Sequence[int]) -> Clos
 
 def _closest(encounters: EncounterSet, index: int) -> tuple[float, ...]:
     best: tuple[float, tuple[float, ...]] = (math.inf, (math.nan,) * 5)
-    for both, a, b in encounters.together(index):
+    for both, a, b in encounters.common_samples(index):
         if len(both) < 2:
             continue
         apart, step = b - a, np.diff(b - a)
@@ -144,7 +144,7 @@ def _closest(encounters: EncounterSet, index: int) -> tuple[float, ...]:
 
 def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged: bool) -> None:
     """Print what is in a set, and draw it where that is asked for."""
-    path = None if figure is None else named(figure, "--figure")
+    path = None if figure is None else user_path(figure, "--figure")
     if path is not None:
         check_ending(path, PICTURES, "--figure")
         check_file(path, "--figure")
@@ -257,7 +257,7 @@ def split_encounters(
     """Write a set of copies of another set's encounters."""
     if (scores is None) != (score is None):
         raise UsageError("--scores TABLE and --score COLUMN belong together: give both, or neither")
-    path = named(out)
+    path = user_path(out)
     check_ending(path, [SET])
     check_file(path)
     try:

@@ -45,16 +45,16 @@ def expected_copies(scores: FloatArray, levels: FloatArray, copies: FloatArray) 
     return result
 
 
-def drawn_copies(numbers: IntArray, expected: FloatArray, seed: int) -> IntArray:
+def draw_copies(numbers: IntArray, expected: FloatArray, seed: int) -> IntArray:
     """Return how many copies there are of each: the whole part, and one more by chance."""
-    uniform = EncounterDraws(seed, "splitting").few(numbers, 1)[0]
+    uniform = EncounterDraws(seed, "splitting").uniform_of_few(numbers, 1)[0]
     result: IntArray = np.floor(expected).astype(np.int64) + (uniform < expected % 1.0)
     return result
 
 
 def split_set(encounters: EncounterSet, expected: FloatArray, seed: int) -> EncounterSet:
     """Return a set of copies, numbered from 0, that know their family."""
-    many = drawn_copies(encounters.numbers, expected, seed)
+    many = draw_copies(encounters.numbers, expected, seed)
     indices = np.repeat(np.arange(len(encounters)), many)
     family: AnyArray = encounters.extra.get(FAMILY, encounters.numbers)
     made = encounters.take(indices)
@@ -74,7 +74,7 @@ def nearness(encounters: EncounterSet, index: int) -> float:
     between two samples is left out: it is a score, and no estimate rests on it.
     """
     best = np.inf
-    for times, own, other in encounters.together(index):
+    for times, own, other in encounters.common_samples(index):
         if len(times):
             north, east, up = other - own
             horizontal = np.hypot(north, east) / _NMAC.horizontal_m

@@ -97,7 +97,7 @@ class TrackRules:
                 raise TrackError(
                     f"{model.path}: {_why_not(model, label)} (--raw writes what it gives)"
                 )
-        self._layer = self._at(LAYER)
+        self._layer = self._index_of(LAYER)
         bins = model.bins[self._layer]
         edges = bins.edges
         if edges is None:
@@ -119,7 +119,7 @@ class TrackRules:
         if "fw" in model.name:
             self._speed_ft_s[0] = np.maximum(self._speed_ft_s[0], _SLOWEST_FIXED_WING_FT_S)
 
-    def _at(self, label: str) -> int:
+    def _index_of(self, label: str) -> int:
         index = self.model.index_of(label)
         assert index is not None
         return index
@@ -139,14 +139,14 @@ class TrackRules:
         """Return what tracks command, in feet and seconds."""
         return Commands(
             self.altitude_ft(tracks),
-            tracks.initial[self._at(SPEED)] * FT_S_PER_KT,
+            tracks.initial[self._index_of(SPEED)] * FT_S_PER_KT,
             self._over_time(tracks, ACCELERATION) * FT_S_PER_KT,
             self._over_time(tracks, CLIMB) / 60.0,
             np.radians(self._over_time(tracks, TURN)),
         )
 
     def _over_time(self, tracks: SampledTracks, label: str) -> FloatArray:
-        index, dynamic = self._at(label), self.model.dynamic
+        index, dynamic = self._index_of(label), self.model.dynamic
         if index in dynamic:
             result: FloatArray = tracks.changing[:, dynamic.index(index)]
             return result
@@ -154,10 +154,10 @@ class TrackRules:
             tracks.initial[index], (len(tracks.changing), len(tracks.numbers))
         ).copy()
 
-    def accepted(self, tracks: SampledTracks, flown: FlownTracks) -> BoolArray:
+    def is_accepted(self, tracks: SampledTracks, flown: FlownTracks) -> BoolArray:
         """Return which flights are accepted."""
         good = self.flies(tracks, flown.climb_ft_s, flown.speed_ft_s)
-        return good & self.inside(flown.up_ft)
+        return good & self.is_inside(flown.up_ft)
 
     def flies(self, tracks: SampledTracks, climb_ft_s: FloatArray, speed: FloatArray) -> BoolArray:
         """Return which tracks keep the limits of speed (ft/s) and vertical rate."""
@@ -167,7 +167,7 @@ class TrackRules:
         steepest = self.steepest_ft_s(tracks)
         return good & (climb_ft_s.max(axis=0) <= steepest) & (climb_ft_s.min(axis=0) >= -steepest)
 
-    def inside(self, up_ft: FloatArray) -> BoolArray:
+    def is_inside(self, up_ft: FloatArray) -> BoolArray:
         """Return which tracks stay within the outer edges of the layers, and above the ground."""
         lowest = max(float(self._edges_ft[0]), 0.0)
         good: BoolArray = up_ft.min(axis=0) >= lowest
@@ -188,7 +188,7 @@ class TrackRules:
 
     def _limits(self, label: str) -> FloatArray:
         """Return the upper edges of the bins with both points, (2, areas x airspaces x layers)."""
-        index = self._at(label)
+        index = self._index_of(label)
         edges = self.model.bins[index].edges
         if edges is None:
             raise TrackError(
@@ -242,7 +242,7 @@ def conditional(network: BayesNetwork, given: list[int], index: int) -> FloatArr
     return result
 
 
-def accepted_tracks(
+def sample_accepted_tracks(
     sampler: TrackSampler, rules: TrackRules, numbers: range, seconds: int, dynamics: str
 ) -> Iterator[tuple[SampledTracks, FlownTracks]]:
     """Give accepted tracks with their flights, in batches in order of their numbers."""
@@ -254,11 +254,11 @@ def accepted_tracks(
             tracks = sampler.sample([some[k] for k in left], seconds, attempt)
             commands = rules.commands(tracks)
             flown = commands.fly(dynamics)
-            good = rules.accepted(tracks, flown)
+            good = rules.is_accepted(tracks, flown)
             if kept is None:
                 kept = tracks
             else:
-                kept.put(left[good], tracks, good)
+                kept.replace(left[good], tracks, good)
             left = left[~good]
             if not len(left):
                 break

@@ -26,7 +26,7 @@ def product(left: FloatArray, right: FloatArray) -> FloatArray:
     return total
 
 
-def product_transposed(left: FloatArray, right: FloatArray) -> FloatArray:
+def multiply_by_transpose(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return left · rightᵀ for matrices (a, k, n) and (b, k, n)."""
     return product(left, right.swapaxes(0, 1))
 
@@ -39,7 +39,7 @@ def times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     return total
 
 
-def selected(values: FloatArray, which: IntArray) -> FloatArray:
+def select_tracks(values: FloatArray, which: IntArray) -> FloatArray:
     """Return some tracks' values (…, n), contiguous in memory as indexing would not leave them."""
     return values.take(which, axis=-1)
 
@@ -49,14 +49,14 @@ class Batch:
 
     def take(self, which: IntArray | slice) -> Self:
         """Return those of some tracks."""
-        return type(self)(*(_some(part, which) for part in vars(self).values()))
+        return type(self)(*(_select_part(part, which) for part in vars(self).values()))
 
 
-def _some(part: Any, which: IntArray | slice) -> Any:
+def _select_part(part: Any, which: IntArray | slice) -> Any:
     if isinstance(part, np.ndarray):
         return part[..., which] if isinstance(which, slice) else part.take(which, axis=-1)
     if isinstance(part, list):
-        return [_some(one, which) for one in part]
+        return [_select_part(one, which) for one in part]
     return None if part is None else part.take(which)
 
 

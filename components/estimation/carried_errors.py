@@ -21,16 +21,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from components.estimation.batched import (
+    multiply_by_transpose,
     product,
-    product_transposed,
-    selected,
+    select_tracks,
     squared_length,
     symmetric,
     times,
 )
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
-from components.estimation.measurement import Kind, expected, linearised
+from components.estimation.measurement import Kind, expected_measurement, linearise
 from components.estimation.motion import ConstantVelocity, Motion
 from dsa_des.arrays.types import BoolArray, FloatArray
 
@@ -67,7 +67,7 @@ class MotionWithErrors:
 
     def move(self, state: FloatArray, dt_s: FloatArray) -> FloatArray:
         """Return states (d, n) after the time (n,)."""
-        errors, end = self._kept(dt_s), _MOVING + len(self.lasts_s)
+        errors, end = self._remaining_share(dt_s), _MOVING + len(self.lasts_s)
         moved = self.model.move(np.concatenate([state[:_MOVING], state[end:]]), dt_s)
         return np.concatenate([moved[:_MOVING], errors * state[_MOVING:end], moved[_MOVING:]])
 
@@ -75,25 +75,25 @@ class MotionWithErrors:
         """Return the derivative of `move` by the state, (d, d, n)."""
         end = _MOVING + len(self.lasts_s)
         own = np.concatenate([state[:_MOVING], state[end:]])
-        step = self._spread_out(self.model.jacobian(own, dt_s))
-        for i, kept in enumerate(self._kept(dt_s)):
+        step = self._embed_matrix(self.model.jacobian(own, dt_s))
+        for i, kept in enumerate(self._remaining_share(dt_s)):
             step[_MOVING + i, _MOVING + i] = kept
         return step
 
     def noise(self, dt_s: FloatArray) -> FloatArray:
         """Return the covariance of what white noise adds, (d, d, n)."""
-        added = self._spread_out(self.model.noise(dt_s))
-        for i, kept in enumerate(self._kept(dt_s)):
+        added = self._embed_matrix(self.model.noise(dt_s))
+        for i, kept in enumerate(self._remaining_share(dt_s)):
             added[_MOVING + i, _MOVING + i] = 1.0 - kept * kept
         return added
 
-    def _kept(self, dt_s: FloatArray) -> FloatArray:
+    def _remaining_share(self, dt_s: FloatArray) -> FloatArray:
         """Return how much of each error is left after a time, the same back as forth."""
         apart = np.abs(dt_s)
         at_once = np.where(apart > 0.0, np.inf, 0.0)
         return np.exp(-np.stack([apart / t if t > 0.0 else at_once for t in self.lasts_s]))
 
-    def _spread_out(self, own: FloatArray) -> FloatArray:
+    def _embed_matrix(self, own: FloatArray) -> FloatArray:
         """Return a model's matrix with room for the errors."""
         end = _MOVING + len(self.lasts_s)
         whole = np.zeros((self.size, self.size, own.shape[2]))
@@ -118,7 +118,7 @@ class ReportedErrors:
     # already, m; NaN where nothing is known but its speed
     ahead_m: FloatArray | None = None
 
-    def repeated(self, times: int) -> "ReportedErrors":
+    def repeat(self, times: int) -> "ReportedErrors":
         """Return them so many times, one after the other."""
         return ReportedErrors(
             self.ways, np.tile(self.deviation, times), np.tile(self.age_s, times),
@@ -126,7 +126,9 @@ class ReportedErrors:
             None if self.ahead_m is None else np.tile(self.ahead_m, times),
         )  # fmt: skip
 
-    def reported_by(self, covariance: FloatArray, velocity: FloatArray) -> "ReportedErrors":
+    def with_track_covariances(
+        self, covariance: FloatArray, velocity: FloatArray
+    ) -> "ReportedErrors":
         """Return them for tracks with some covariances, as far as they were reported by these.
 
         Later reports are late by the same: they tell nothing of it. The speed is known ever better
@@ -146,7 +148,7 @@ class ReportedErrors:
         return way if self.ahead_m is None else np.where(np.isnan(self.ahead_m), way, self.ahead_m)
 
     @property
-    def considered(self) -> BoolArray | None:
+    def considered_components(self) -> BoolArray | None:
         """Which components of a state its reports do not correct, (k, n); None for none.
 
         All that an aircraft reports is late alike, so its reports do not tell by how much: only
@@ -158,16 +160,16 @@ class ReportedErrors:
         own = late[:, np.newaxis] & (self.deviation > 0.0)
         return np.concatenate([np.zeros((_MOVING, own.shape[1]), dtype=bool), own])
 
-    def expected(self, kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
+    def expected_measurement(self, kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
         """Return what would be measured of states with these errors, (m, n)."""
-        return expected(kind, self._displaced(state, pose)[0], pose)
+        return expected_measurement(kind, self._reported_states(state, pose)[0], pose)
 
-    def linearised(
+    def linearise(
         self, kind: Kind, state: FloatArray, pose: SensorPose
     ) -> tuple[FloatArray, FloatArray]:
         """Return the same, and its derivative by position, velocity and errors."""
-        reported, by_position, cylinder = self._displaced(state, pose)
-        seen, slope = linearised(kind, reported, pose)
+        reported, by_position, cylinder = self._reported_states(state, pose)
+        seen, slope = linearise(kind, reported, pose)
         whole = np.zeros((len(seen), _MOVING + len(self.ways), seen.shape[1]))
         whole[:, :3] = product(slope[:, :3], by_position)
         if slope.shape[1] > 3:
@@ -182,7 +184,7 @@ class ReportedErrors:
         """Return how errors move reported positions and velocities (6, n), (6, errors, n)."""
         state = np.zeros((_MOVING + len(self.ways), moving.shape[1]))
         state[:_MOVING] = moving
-        return self._effects(state, self._displaced(state, pose)[2])
+        return self._effects(state, self._reported_states(state, pose)[2])
 
     def _sum(self, state: FloatArray, way: int) -> FloatArray:
         total = np.zeros(state.shape[1])
@@ -191,7 +193,7 @@ class ReportedErrors:
                 total = total + self.deviation[i] * state[_MOVING + i]
         return total
 
-    def _displaced(
+    def _reported_states(
         self, state: FloatArray, pose: SensorPose
     ) -> tuple[FloatArray, FloatArray, tuple[FloatArray, ...]]:
         """Return states as reported, the derivative of positions, and cosines of directions."""
@@ -285,35 +287,35 @@ class Ages:
         """
         carried, now, age = self.position, self.velocity, self.position + self.late
         place, speed = model.jacobian(state, -age)[:3], model.jacobian(state, -now)[3:_MOVING]
-        by_speed = product_transposed(product(speed, model.noise(now)), speed)
-        both = product_transposed(product(place, model.noise(np.minimum(age, now))), speed)
+        by_speed = multiply_by_transpose(product(speed, model.noise(now)), speed)
+        both = multiply_by_transpose(product(place, model.noise(np.minimum(age, now))), speed)
         error = np.empty((_MOVING, _MOVING, len(age)))
-        error[:3, :3] = product_transposed(product(place, model.noise(age)), place)
+        error[:3, :3] = multiply_by_transpose(product(place, model.noise(age)), place)
         error[:3, :3] += carried * (both + both.swapaxes(0, 1)) + carried**2 * by_speed
         for i in range(3):
             error[i, i] += (2.0 * self.late) ** 2 * velocity_variance[i]
         error[:3, 3:] = both + carried * by_speed
         error[3:, :3], error[3:, 3:] = error[:3, 3:].swapaxes(0, 1), by_speed
         shared = np.empty((len(state), _MOVING, len(age)))
-        shared[:, 3:] = -product_transposed(model.noise(np.minimum(self.since, now)), speed)
-        shared[:, :3] = -product_transposed(model.noise(np.minimum(self.since, age)), place)
+        shared[:, 3:] = -multiply_by_transpose(model.noise(np.minimum(self.since, now)), speed)
+        shared[:, :3] = -multiply_by_transpose(model.noise(np.minimum(self.since, age)), place)
         shared[:, :3] += carried * shared[:, 3:]
         return symmetric(error), shared
 
-    def added(
+    def add_age_errors(
         self, moments: Moments, model: Motion, state: FloatArray, covariance: FloatArray
     ) -> Moments:
         """Return what is expected of measurements, with what ages add to it."""
         own = model.model if isinstance(model, MotionWithErrors) else model
         slope = np.ascontiguousarray(moments.jacobian[:, :_MOVING])
         if not isinstance(own, ConstantVelocity):
-            moments = self._turned_back(moments, model, state, covariance)
+            moments = self._rotate_back(moments, model, state, covariance)
         speeds = np.stack([covariance[i, i] for i in (3, 4, 5)])
         error, shared = self.errors(model, state, speeds)
         shared = _possible(shared, error, covariance)
         known, seen = slope.shape[1], moments.jacobian.shape[1]
-        new = product_transposed(product(slope, error[:known, :known]), slope)
-        with_state = product_transposed(shared[:, :known], slope)  # (d, m, n)
+        new = multiply_by_transpose(product(slope, error[:known, :known]), slope)
+        with_state = multiply_by_transpose(shared[:, :known], slope)  # (d, m, n)
         both = product(moments.jacobian, with_state[:seen])
         own_error = new + both.swapaxes(0, 1)
         left_over = moments.left_over
@@ -323,7 +325,7 @@ class Ages:
             shared=with_state[:seen].swapaxes(0, 1),
         )  # fmt: skip
 
-    def _turned_back(
+    def _rotate_back(
         self, moments: Moments, model: Motion, state: FloatArray, covariance: FloatArray
     ) -> Moments:
         """Return what is expected of velocities as they were, and of positions they carried on.
@@ -344,7 +346,7 @@ class Ages:
         by_state[:3] += carried * by_state[3:]
         slope = np.ascontiguousarray(moments.jacobian[:, :6])
         more = product(slope, by_state)
-        with_state = product_transposed(covariance, more)
+        with_state = multiply_by_transpose(covariance, more)
         jacobian = more.copy()
         jacobian[:, : moments.jacobian.shape[1]] += moments.jacobian
         both = product(more, moments.cross)
@@ -365,7 +367,7 @@ def _possible(shared: FloatArray, error: FloatArray, covariance: FloatArray) -> 
     if len(some) == 0:
         return shared
     state, own, across = (
-        selected(values, some).transpose(2, 0, 1) for values in (covariance, error, shared)
+        select_tracks(values, some).transpose(2, 0, 1) for values in (covariance, error, shared)
     )
     scale = np.sqrt(np.maximum(np.diagonal(own, axis1=1, axis2=2), _LEAST_VARIANCE))
     own = own / (scale[:, :, np.newaxis] * scale[:, np.newaxis])

@@ -16,8 +16,8 @@ import numpy as np
 
 from components.estimation.batched import (
     cholesky,
+    multiply_by_transpose,
     product,
-    product_transposed,
     solve_lower,
     solve_upper,
     sum_of,
@@ -34,7 +34,7 @@ _STEPS = 60
 _CLOSE = 1e-15
 
 
-def intersected(
+def intersect_covariances(
     covariance: FloatArray, information: FloatArray, pull: FloatArray, rule: Rule
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return what a second piece of information does to estimates."""
@@ -53,7 +53,7 @@ def intersected(
         weight = best_weight(eigenvalues, cost, 1 if rule == "determinant" else 2)
         share = 1.0 - weight
     spread = 1.0 / (weight + share * eigenvalues)
-    result = symmetric(product_transposed(turned * spread, turned))
+    result = symmetric(multiply_by_transpose(turned * spread, turned))
     return share * times(result, pull), result, weight
 
 

@@ -16,8 +16,8 @@ from components.estimation.batched import (
     cholesky,
     distance_squared,
     is_everything,
-    product_transposed,
-    selected,
+    multiply_by_transpose,
+    select_tracks,
     sum_of,
     symmetric,
 )
@@ -28,10 +28,10 @@ from components.estimation.kalman import (
     Moments,
     linear_moments,
     log_likelihood,
-    updated,
+    update,
     variance_of_what_is_new,
 )
-from components.estimation.measurement import Kind, linearised, residual
+from components.estimation.measurement import Kind, linearise, residual
 from components.estimation.motion import Motion, predict
 from dsa_des.arrays.types import FloatArray, IntArray
 
@@ -57,13 +57,13 @@ class Estimates(NamedTuple):
         if is_everything(which, self.weights.shape[1]):
             return self
         return Estimates(
-            [selected(x, which) for x in self.states],
-            [selected(p, which) for p in self.covariances],
-            selected(self.weights, which),
+            [select_tracks(x, which) for x in self.states],
+            [select_tracks(p, which) for p in self.covariances],
+            select_tracks(self.weights, which),
         )
 
     @classmethod
-    def joined(cls, parts: Sequence["Estimates"]) -> "Estimates":
+    def concatenate(cls, parts: Sequence["Estimates"]) -> "Estimates":
         """Return the tracks of all parts, one after the other."""
         states, covariances, weights = zip(*parts, strict=True)
         return cls(
@@ -142,9 +142,9 @@ class Estimator(Protocol):
         before = tracks.take(track)
         whole = is_everything(which, pairs.residuals[0].shape[1])
         moved = [
-            updated(
+            update(
                 x, p, innovation if whole else innovation.take(which),
-                apart if whole else selected(apart, which),
+                apart if whole else select_tracks(apart, which),
             )
             for x, p, innovation, apart in zip(
                 before.states, before.covariances, pairs.learning or pairs.innovations,
@@ -154,7 +154,7 @@ class Estimator(Protocol):
         weights = before.weights
         if len(self.models) > 1:
             odds = pairs.log_likelihoods if pairs.log_odds is None else pairs.log_odds
-            weights = reweighted(weights, selected(odds, which))
+            weights = update_model_probabilities(weights, select_tracks(odds, which))
         return Estimates([x for x, _ in moved], [p for _, p in moved], weights)
 
     def merge(
@@ -190,7 +190,7 @@ class Estimator(Protocol):
         weights = np.where(paired, weights / weights.sum(axis=0), tracks.weights)
         return Estimates(states, covariances, weights)
 
-    def models_then(
+    def past_model_probabilities(
         self, weights: FloatArray, until_s: FloatArray, since_s: FloatArray
     ) -> FloatArray:
         """Return how likely each model was at a past instant, for each of now, (then, now, n).
@@ -238,7 +238,7 @@ class ExtendedKalmanFilter(SingleModelFilter):
         reported: ReportedErrors | None = None,
     ) -> list[Moments]:
         """Return what is expected to be measured."""
-        how = linearised if reported is None else reported.linearised
+        how = linearise if reported is None else reported.linearise
         seen, jacobian = how(kind, tracks.states[0], pose)
         return [linear_moments(seen, jacobian, tracks.covariances[0])]
 
@@ -266,7 +266,7 @@ def pair_measurement(
     spread = np.zeros(variance.shape)
     for weight, expected in zip(weights, moments, strict=True):
         for i in range(len(spread)):
-            spread[i] += selected(weight * expected.total[i, i], track)
+            spread[i] += select_tracks(weight * expected.total[i, i], track)
     new = variance_of_what_is_new(variance, common, spread)
     learning = [one.innovation(new, track) for one in moments]
     odds = None
@@ -281,14 +281,16 @@ def innovation_squared(pairs: PairMeasurement, weights: FloatArray, which: IntAr
     """Return the normalised innovations squared of pairs, of the mixture of their models."""
     if len(weights) == 1:
         return pairs.distance[which]
-    residuals = [selected(apart, which) for apart in pairs.residuals]
+    residuals = [select_tracks(apart, which) for apart in pairs.residuals]
     mean = residuals[0] * weights[0]
     for weight, apart in zip(weights[1:], residuals[1:], strict=True):
         mean = mean + weight * apart
     spread = np.zeros((len(mean), *mean.shape))
     for weight, apart, one in zip(weights, residuals, pairs.innovations, strict=True):
-        root, off = selected(one.root, which), apart - mean
-        spread += weight * (product_transposed(root, root) + off[:, np.newaxis] * off[np.newaxis])
+        root, off = select_tracks(one.root, which), apart - mean
+        spread += weight * (
+            multiply_by_transpose(root, root) + off[:, np.newaxis] * off[np.newaxis]
+        )
     return distance_squared(cholesky(spread), mean)
 
 
@@ -314,7 +316,7 @@ def mixture_by_track(
 
     size = len(states)
     mean = np.stack([summed(share * states[i]) for i in range(size)])
-    apart = states - selected(mean, track)
+    apart = states - select_tracks(mean, track)
     spread = np.empty((size, size, count))
     for i in range(size):
         for j in range(i, size):
@@ -323,7 +325,9 @@ def mixture_by_track(
     return mean, symmetric(spread)
 
 
-def reweighted(probabilities: FloatArray, log_likelihoods: FloatArray) -> FloatArray:
+def update_model_probabilities(
+    probabilities: FloatArray, log_likelihoods: FloatArray
+) -> FloatArray:
     """Return the models' probabilities after a look, (models, n), from those before it."""
     with np.errstate(divide="ignore"):
         logs = np.log(probabilities) + log_likelihoods
@@ -331,7 +335,7 @@ def reweighted(probabilities: FloatArray, log_likelihoods: FloatArray) -> FloatA
     return weights / sum_of(list(weights))
 
 
-def combined(tracks: Estimates) -> tuple[FloatArray, FloatArray]:
+def mixture_moments(tracks: Estimates) -> tuple[FloatArray, FloatArray]:
     """Return mean (6, n) and covariance (6, 6, n) of position and velocity over the models."""
     states, covariances, probabilities = tracks
     many = len(states)

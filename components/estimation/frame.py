@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.estimation.batched import Batch, product, product_transposed, times
+from components.estimation.batched import Batch, multiply_by_transpose, product, times
 from components.geometry import local_axes, ned_to_body_unchecked, north_east_up
 from dsa_des.arrays.types import FloatArray
 
@@ -45,7 +45,7 @@ def pose_in_frame(
     turned = np.array(ned_to_body_unchecked(*horizon, *attitude_rad)).reshape(3, 3, np.size(lat))
     moves = None
     if velocity_m_s is not None:
-        moves = _along_others(velocity_m_s, there, here)
+        moves = _change_axes(velocity_m_s, there, here)
     return SensorPose(np.array([north, east, -up]), turned, moves)
 
 
@@ -54,10 +54,10 @@ def vectors_in_frame(
 ) -> FloatArray:
     """Return vectors along the horizon's axes at places, (3, n), along those of frames."""
     here, there = ned_axes(*origin_deg_m[:2]), ned_axes(*position_deg_m[:2])
-    return _along_others(vector, there, here)
+    return _change_axes(vector, there, here)
 
 
-def _along_others(vector: FloatArray, old: list[FloatArray], new: list[FloatArray]) -> FloatArray:
+def _change_axes(vector: FloatArray, old: list[FloatArray], new: list[FloatArray]) -> FloatArray:
     """Return vectors along new axes, of those along old ones, both in the Earth's axes."""
     in_space = sum(v * axis for v, axis in zip(vector, old, strict=True))
     return np.array([dot(in_space, axis) for axis in new])
@@ -98,7 +98,7 @@ class FrameChange:
         for i in (0, 3):
             for j in (0, 3):
                 block = product(self.turn, covariance[i : i + 3, j : j + 3])
-                turned[i : i + 3, j : j + 3] = product_transposed(block, self.turn)
+                turned[i : i + 3, j : j + 3] = multiply_by_transpose(block, self.turn)
         return turned
 
 

@@ -48,7 +48,7 @@ class InteractingMultipleModels(Estimator):
     def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
         """Return tracks after times (n,): the models are mixed, then each goes on."""
         steps = transition_probabilities(self.rates_per_s, dt_s)
-        states, covariances, weights = mixed(*tracks, steps, self.fresh, 6 + self.errors)
+        states, covariances, weights = mix_models(*tracks, steps, self.fresh, 6 + self.errors)
         moved = [
             one.predict(Estimates([x], [p], weights), dt_s)
             for one, x, p in zip(self.filters, states, covariances, strict=True)
@@ -77,11 +77,11 @@ class InteractingMultipleModels(Estimator):
             for one, x, p in zip(self.filters, tracks.states, tracks.covariances, strict=True)
         ]
 
-    def models_then(
+    def past_model_probabilities(
         self, weights: FloatArray, until_s: FloatArray, since_s: FloatArray
     ) -> FloatArray:
         """Return how likely each model was at a past instant, for each of now, (then, now, n)."""
-        return before(self.rates_per_s, weights, until_s, since_s)
+        return past_probabilities(self.rates_per_s, weights, until_s, since_s)
 
 
 def transition_probabilities(rates_per_s: FloatArray, dt_s: FloatArray) -> FloatArray:
@@ -110,7 +110,7 @@ def transition_probabilities(rates_per_s: FloatArray, dt_s: FloatArray) -> Float
     return total / sums
 
 
-def mixed(
+def mix_models(
     states: Sequence[FloatArray],
     covariances: Sequence[FloatArray],
     probabilities: FloatArray,
@@ -145,7 +145,7 @@ def mixed(
     return new_states, new_covariances, predicted
 
 
-def before(
+def past_probabilities(
     rates_per_s: FloatArray, probabilities: FloatArray, until_s: FloatArray, since_s: FloatArray
 ) -> FloatArray:
     """Return how likely each model was at an instant that is past, for each model of now."""

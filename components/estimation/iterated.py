@@ -11,10 +11,10 @@ Trans. Automatic Control 38 (1993).
 
 import numpy as np
 
-from components.estimation.batched import selected, times
+from components.estimation.batched import select_tracks, times
 from components.estimation.frame import SensorPose
-from components.estimation.kalman import Innovation, innovation, updated
-from components.estimation.measurement import Kind, expected, linearised, residual
+from components.estimation.kalman import Innovation, innovation, update
+from components.estimation.measurement import Kind, expected_measurement, linearise, residual
 from dsa_des.arrays.types import FloatArray
 
 # By how many deviations of a measurement a step may leave the measured curve: one that leaves it
@@ -41,23 +41,27 @@ def iterate(
     left = np.flatnonzero(_bend(kind, pose, before[0], after[0], first) > _FAR)
     if len(left) == 0:
         return
-    state, covariance = selected(before[0], left), selected(before[1], left)
-    measured = selected(first.expected + apart, left)
-    variance, pose, at = selected(first.spread, left), pose.take(left), selected(after[0], left)
+    state, covariance = select_tracks(before[0], left), select_tracks(before[1], left)
+    measured = select_tracks(first.expected + apart, left)
+    variance, pose, at = (
+        select_tracks(first.spread, left),
+        pose.take(left),
+        select_tracks(after[0], left),
+    )
     for _ in range(_MOST_STEPS):
-        seen, jacobian = linearised(kind, at, pose)
+        seen, jacobian = linearise(kind, at, pose)
         here = innovation(seen, jacobian, covariance, variance)
         back = times(jacobian, (at - state)[: jacobian.shape[1]])
-        moved, spread = updated(state, covariance, here, residual(measured, seen) + back)
+        moved, spread = update(state, covariance, here, residual(measured, seen) + back)
         bend = _bend(kind, pose, at, moved, here)
         ends = np.flatnonzero(bend <= _NEAR)
         after[0][:, left[ends]], after[1][:, :, left[ends]] = moved[:, ends], spread[:, :, ends]
         rest = np.flatnonzero(bend > _NEAR)
         if not len(rest):
             return
-        left, at, pose = left[rest], selected(moved, rest), pose.take(rest)
-        state, covariance = selected(state, rest), selected(covariance, rest)
-        measured, variance = selected(measured, rest), selected(variance, rest)
+        left, at, pose = left[rest], select_tracks(moved, rest), pose.take(rest)
+        state, covariance = select_tracks(state, rest), select_tracks(covariance, rest)
+        measured, variance = select_tracks(measured, rest), select_tracks(variance, rest)
 
 
 def _bend(
@@ -65,5 +69,7 @@ def _bend(
 ) -> FloatArray:
     """Return by how many deviations what is measured leaves the tangent at `state`, at `moved`."""
     step = (moved - state)[: slope.jacobian.shape[1]]
-    off = residual(expected(kind, moved, pose), slope.expected + times(slope.jacobian, step))
+    off = residual(
+        expected_measurement(kind, moved, pose), slope.expected + times(slope.jacobian, step)
+    )
     return np.asarray(np.sqrt((off * off / slope.spread).max(axis=0)))

@@ -13,9 +13,9 @@ from components.estimation.batched import (
     cholesky,
     is_everything,
     log_determinant,
+    multiply_by_transpose,
     product,
-    product_transposed,
-    selected,
+    select_tracks,
     solve_lower,
     solve_upper,
     symmetric,
@@ -63,10 +63,10 @@ class Moments:
         expected, total, cross, jacobian = self.expected, self.total, self.cross, self.jacobian
         spread, shared, considered = self.left_over, self.shared, self.considered
         if which is not None and not is_everything(which, expected.shape[1]):
-            expected, total = selected(expected, which), selected(total, which)
-            cross, jacobian = selected(cross, which), selected(jacobian, which)
-            spread = None if spread is None else selected(spread, which)
-            shared = None if shared is None else selected(shared, which)
+            expected, total = select_tracks(expected, which), select_tracks(total, which)
+            cross, jacobian = select_tracks(cross, which), select_tracks(jacobian, which)
+            spread = None if spread is None else select_tracks(spread, which)
+            shared = None if shared is None else select_tracks(shared, which)
             considered = None if considered is None else considered.take(which, axis=-1)
         else:
             total = total.copy()
@@ -83,7 +83,7 @@ class Moments:
 
 def linear_moments(expected: FloatArray, jacobian: FloatArray, covariance: FloatArray) -> Moments:
     """Return the moments of an extended Kalman filter."""
-    cross = product_transposed(covariance[:, : jacobian.shape[1]], jacobian)
+    cross = multiply_by_transpose(covariance[:, : jacobian.shape[1]], jacobian)
     return Moments(expected, product(jacobian, cross[: jacobian.shape[1]]), cross, jacobian)
 
 
@@ -94,23 +94,23 @@ def innovation(
     return linear_moments(expected, jacobian, covariance).innovation(variance)
 
 
-def updated(
+def update(
     state: FloatArray, covariance: FloatArray, innovation: Innovation, residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return state and covariance after a measurement, in Joseph form."""
     count = state.shape[1]
     if count <= _TOGETHER:
-        return _updated(state, covariance, innovation, residual)
+        return _update_batch(state, covariance, innovation, residual)
     moved, spread = np.empty_like(state), np.empty_like(covariance)
     for first in range(0, count, _TOGETHER):
         part = slice(first, first + _TOGETHER)
-        moved[:, part], spread[:, :, part] = _updated(
+        moved[:, part], spread[:, :, part] = _update_batch(
             state[:, part], covariance[:, :, part], innovation.take(part), residual[:, part]
         )
     return moved, spread
 
 
-def _updated(
+def _update_batch(
     state: FloatArray, covariance: FloatArray, innovation: Innovation, residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     # With S = root · rootᵀ: K r = (root⁻¹ (P Hᵀ)ᵀ)ᵀ (root⁻¹ r).
@@ -138,11 +138,11 @@ def joseph(covariance: FloatArray, weighted: FloatArray, innovation: Innovation)
     known, size = innovation.jacobian.shape[1], len(covariance)
     whole = np.empty(covariance.shape)
     if known < size:
-        _less_squares(covariance, weighted, slice(known, size), slice(0, size), whole)
+        _subtract_gain_squares(covariance, weighted, slice(known, size), slice(0, size), whole)
         whole[:known, known:] = whole[known:, :known].swapaxes(0, 1)
     measured = slice(0, known)
     block = whole[measured, measured]
-    _less_squares(covariance, weighted, measured, measured, whole)
+    _subtract_gain_squares(covariance, weighted, measured, measured, whole)
     gain = solve_upper(innovation.root, weighted[:, measured])
     if innovation.spread.ndim == 2:
         own = gain * innovation.spread[:, np.newaxis]
@@ -161,7 +161,7 @@ def joseph(covariance: FloatArray, weighted: FloatArray, innovation: Innovation)
     return whole
 
 
-def _less_squares(
+def _subtract_gain_squares(
     covariance: FloatArray, weighted: FloatArray, rows: slice, columns: slice, out: FloatArray
 ) -> None:
     """Write some rows and columns of P - K S Kᵀ; mirrored elements are the same to the bit."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.estimation.batched import product, product_transposed, squared_length, times
+from components.estimation.batched import multiply_by_transpose, product, squared_length, times
 from components.estimation.frame import SensorPose, dot
 from components.geometry import unit_vector_unchecked, wrap_pi_unchecked
 from dsa_des.arrays.types import BoolArray, FloatArray
@@ -37,7 +37,7 @@ class Kind:
         return 2 + self.has_range + self.has_range_rate + 3 * self.has_velocity
 
 
-def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
+def expected_measurement(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
     """Return what would be measured without error."""
     away = state[:3] - pose.position_m
     x, y, z = times(pose.to_body, away)
@@ -57,7 +57,7 @@ def expected(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
     return seen
 
 
-def linearised(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatArray, FloatArray]:
+def linearise(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatArray, FloatArray]:
     """Return what would be measured, and its derivative by position and velocity."""
     away = state[:3] - pose.position_m
     turned = pose.to_body
@@ -164,8 +164,8 @@ def half_angle_rad(
     position_m: FloatArray, covariance: FloatArray, pose: SensorPose, sigmas: float
 ) -> FloatArray:
     """Return how far from its expected direction a target may be seen."""
-    seen, by_position = linearised(Kind(has_range=False), position_m, pose)
-    spread = product_transposed(product(by_position, covariance), by_position)
+    seen, by_position = linearise(Kind(has_range=False), position_m, pose)
+    spread = multiply_by_transpose(product(by_position, covariance), by_position)
     level = np.cos(seen[1])
     across, upward = spread[0, 0] * level * level, spread[1, 1]
     both = spread[0, 1] * level

@@ -17,8 +17,8 @@ relative one.
 import numpy as np
 
 from components.estimation.batched import (
+    multiply_by_transpose,
     product,
-    product_transposed,
     squared_length,
     symmetric,
     times,
@@ -35,16 +35,18 @@ _LEAST = 0.8
 _UPRIGHT = 0.1
 
 
-def moved_in_polar(
+def correct_in_polar(
     before: FloatArray, after: FloatArray, covariance: FloatArray, sensor_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return a correction in Cartesian coordinates as one in modified polar ones."""
     axes, distance, by_range, to_polar = _polar(before, sensor_m)
     change = times(to_polar, after[:6] - before[:6])
-    return _moved(axes, distance, by_range, to_polar, change, after, covariance, sensor_m)
+    return _apply_polar_change(
+        axes, distance, by_range, to_polar, change, after, covariance, sensor_m
+    )
 
 
-def turned_about_vertical(
+def correct_by_rotation(
     before: FloatArray,
     after: FloatArray,
     covariance: FloatArray,
@@ -95,11 +97,11 @@ def turned_about_vertical(
     there[2, 2], there[2, 3], there[3, 2], there[3, 3] = cos_then, -sin_then, sin_then, cos_then
     step, rows = product(there, here), [0, 1, 3, 4]
     spread[rows] = product(step, covariance[rows])
-    spread[:, rows] = product_transposed(spread[:, rows], step)
+    spread[:, rows] = multiply_by_transpose(spread[:, rows], step)
     return moved, symmetric(spread)
 
 
-def ranged_in_polar(
+def add_first_range(
     state: FloatArray,
     covariance: FloatArray,
     range_m: FloatArray,
@@ -113,7 +115,7 @@ def ranged_in_polar(
     whole[:6, :6] = to_polar
     for i in range(6, len(state)):
         whole[i, i] = 1.0
-    spread = symmetric(product_transposed(product(whole, covariance), whole))
+    spread = symmetric(multiply_by_transpose(product(whole, covariance), whole))
     error = variance_m2 / (measured * measured) / (measured * measured)
     gain = spread[:, 2] / (spread[2, 2] + error)
     left = -np.concatenate(
@@ -132,7 +134,9 @@ def ranged_in_polar(
     identity = np.zeros_like(to_polar)
     for i in range(6):
         identity[i, i] = 1.0
-    return _moved(axes, distance, by_range, identity, change[:6], moved, joseph, sensor_m)
+    return _apply_polar_change(
+        axes, distance, by_range, identity, change[:6], moved, joseph, sensor_m
+    )
 
 
 def _polar(
@@ -143,10 +147,10 @@ def _polar(
     distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
     axes = _axes(away / distance)
     by_range = np.array([dot(axis, velocity) for axis in axes]) / distance
-    return axes, distance, by_range, _to_polar(axes, distance, velocity)
+    return axes, distance, by_range, _polar_jacobian(axes, distance, velocity)
 
 
-def _moved(
+def _apply_polar_change(
     axes: list[FloatArray],
     distance: FloatArray,
     by_range: FloatArray,
@@ -158,17 +162,17 @@ def _moved(
 ) -> tuple[FloatArray, FloatArray]:
     """Return what a change of polar coordinates makes of state and covariance."""
     row = to_polar[2:3]
-    spread = product_transposed(product(row, covariance[:6, :6]), row)[0, 0]
+    spread = multiply_by_transpose(product(row, covariance[:6, :6]), row)[0, 0]
     least = np.maximum(_LEAST * np.sqrt(np.maximum(spread, 0.0)), 1.0 / _FARTHEST_M)
     inverse = np.minimum(np.maximum(1.0 / distance + change[2], least), 1.0 / _NEAREST_M)
     by_range = by_range + change[3:]
-    turned = _turned(axes, change[0], change[1])
+    turned = _rotate_axes(axes, change[0], change[1])
     moved = state.copy()
     moved[:3] = sensor_m + turned[0] / inverse
     moved[3:6] = sum(w * axis for w, axis in zip(by_range, turned, strict=True)) / inverse
     step = product(_from_polar(turned, change[1], inverse, by_range), to_polar)
     whole = covariance.copy()
-    whole[:6, :6] = product_transposed(product(step, covariance[:6, :6]), step)
+    whole[:6, :6] = multiply_by_transpose(product(step, covariance[:6, :6]), step)
     if len(state) > 6:
         whole[:6, 6:] = product(step, covariance[:6, 6:])
         whole[6:, :6] = whole[:6, 6:].swapaxes(0, 1)
@@ -184,7 +188,9 @@ def _axes(line: FloatArray) -> list[FloatArray]:
     return [line, across, _cross(line, across)]
 
 
-def _to_polar(axes: list[FloatArray], distance: FloatArray, velocity: FloatArray) -> FloatArray:
+def _polar_jacobian(
+    axes: list[FloatArray], distance: FloatArray, velocity: FloatArray
+) -> FloatArray:
     """Return the derivative of polar coordinates by position and velocity, where both angles are 0.
 
     They are two angles, the inverse of the range, and the velocity along the line of sight and
@@ -204,7 +210,7 @@ def _to_polar(axes: list[FloatArray], distance: FloatArray, velocity: FloatArray
     return result
 
 
-def _turned(axes: list[FloatArray], one: FloatArray, other: FloatArray) -> list[FloatArray]:
+def _rotate_axes(axes: list[FloatArray], one: FloatArray, other: FloatArray) -> list[FloatArray]:
     """Return the axes turned by two angles: about the third, and then towards it."""
     line, across, third = axes
     level = np.cos(one) * line + np.sin(one) * across

@@ -13,7 +13,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from components.estimation.batched import product, product_transposed, symmetric
+from components.estimation.batched import multiply_by_transpose, product, symmetric
 from dsa_des.arrays.types import FloatArray
 
 # Below this |turn rate · time| series take the place of quotients; their error is under 1e-17.
@@ -48,7 +48,7 @@ def predict(
     if isinstance(model, ConstantVelocity):
         return model.predict(state, covariance, dt_s)
     step = model.jacobian(state, dt_s)
-    spread = product_transposed(product(step, covariance), step)
+    spread = multiply_by_transpose(product(step, covariance), step)
     spread += model.noise(dt_s)
     return model.move(state, dt_s), symmetric(spread)
 

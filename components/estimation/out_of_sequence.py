@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 from components.estimation.batched import (
     cholesky,
+    multiply_by_transpose,
     product,
-    product_transposed,
     solve_lower,
     solve_upper,
     symmetric,
@@ -37,7 +37,7 @@ class Retrodiction:
     # (d, d, n), how much of a correction of the state then is one of the state now
     gain: FloatArray
 
-    def carried_over(
+    def carry_forward(
         self,
         state: FloatArray,
         covariance: FloatArray,
@@ -45,7 +45,7 @@ class Retrodiction:
         corrected_covariance: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
         """Return the state now after the state then was corrected."""
-        less = product_transposed(
+        less = multiply_by_transpose(
             product(self.gain, corrected_covariance - self.covariance), self.gain
         )
         moved = state + times(self.gain, corrected - self.state)
@@ -63,16 +63,16 @@ def retrodiction(
     then, spread = predict(model, *before, until_then_s)
     step, noise = model.jacobian(then, since_then_s), model.noise(since_then_s)
     ahead, spread_ahead = predict(model, then, spread, since_then_s)
-    back = _divided(product(step, spread), spread_ahead)  # spread · stepᵀ / spread ahead
+    back = _divide_right(product(step, spread), spread_ahead)  # spread · stepᵀ / spread ahead
     rest = -product(back, step)
     for i in range(model.size):
         rest[i, i] += 1.0
-    total = product_transposed(product(rest, spread), rest)
-    total += product_transposed(product(back, noise + now[1]), back)
+    total = multiply_by_transpose(product(rest, spread), rest)
+    total += multiply_by_transpose(product(back, noise + now[1]), back)
     covariance = symmetric(total)
-    across = product_transposed(back, now[1])  # of the state then with the state now
+    across = multiply_by_transpose(back, now[1])  # of the state then with the state now
     return Retrodiction(
-        then + times(back, now[0] - ahead), covariance, _divided(across, covariance)
+        then + times(back, now[0] - ahead), covariance, _divide_right(across, covariance)
     )
 
 
@@ -86,16 +86,16 @@ def retrodiction_by_motion(
     """
     state, spread = now
     step, noise = model.jacobian(state, -since_s), model.noise(since_s)
-    since = product_transposed(product(step, noise), step)
+    since = multiply_by_transpose(product(step, noise), step)
     if isinstance(model, MotionWithErrors):
         since[model.errors, model.errors] = noise[model.errors, model.errors]
-    covariance = symmetric(product_transposed(product(step, spread), step) + since)
+    covariance = symmetric(multiply_by_transpose(product(step, spread), step) + since)
     return Retrodiction(
-        model.move(state, -since_s), covariance, _divided(product(step, spread), covariance)
+        model.move(state, -since_s), covariance, _divide_right(product(step, spread), covariance)
     )
 
 
-def _divided(left: FloatArray, matrix: FloatArray) -> FloatArray:
+def _divide_right(left: FloatArray, matrix: FloatArray) -> FloatArray:
     """Return leftᵀ · matrix⁻¹ for symmetric matrices (d, d, n)."""
     root = cholesky(matrix)
     return solve_upper(root, solve_lower(root, left)).swapaxes(0, 1)

@@ -10,7 +10,7 @@ import numpy as np
 
 from components.estimation.batched import (
     cholesky,
-    product_transposed,
+    multiply_by_transpose,
     solve_lower,
     solve_upper,
     symmetric,
@@ -19,7 +19,7 @@ from components.estimation.carried_errors import ReportedErrors
 from components.estimation.estimator import Estimates, ExtendedKalmanFilter, SingleModelFilter
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
-from components.estimation.measurement import Kind, expected, residual
+from components.estimation.measurement import Kind, expected_measurement, residual
 from components.estimation.motion import Motion
 from dsa_des.arrays.types import FloatArray
 
@@ -44,7 +44,7 @@ class SigmaPoints:
         covariance[0] += 1.0 - self.alpha**2 + self.beta
         return mean, covariance, spread
 
-    def of(self, state: FloatArray, covariance: FloatArray) -> FloatArray:
+    def points_of(self, state: FloatArray, covariance: FloatArray) -> FloatArray:
         """Return the points of states (d, n), shape (d, 2 d + 1, n)."""
         size = len(state)
         apart = cholesky(covariance) * np.sqrt(self.weights(size)[2])
@@ -93,12 +93,12 @@ def predict_unscented(
     """Return state and covariance after a time, with moments of moved sigma points."""
     size, count = state.shape
     of_mean, of_covariance, _ = sigma.weights(size)
-    points = sigma.of(state, covariance)
+    points = sigma.points_of(state, covariance)
     many = points.shape[1]
     moved = model.move(points.reshape(size, -1), np.tile(dt_s, many)).reshape(size, many, count)
-    mean = _weighted(moved, of_mean)
+    mean = _weighted_moments(moved, of_mean)
     apart = moved - mean[:, np.newaxis]
-    spread = product_transposed(apart * of_covariance[:, np.newaxis], apart)
+    spread = multiply_by_transpose(apart * of_covariance[:, np.newaxis], apart)
     return mean, symmetric(spread + model.noise(dt_s))
 
 
@@ -117,25 +117,25 @@ def unscented_moments(
     """
     size, count = state.shape
     of_mean, of_covariance, _ = sigma.weights(size)
-    points = sigma.of(state, covariance)
+    points = sigma.points_of(state, covariance)
     many = points.shape[1]
     poses = SensorPose(
         np.tile(pose.position_m, many),
         np.tile(pose.to_body, many),
         None if pose.velocity_m_s is None else np.tile(pose.velocity_m_s, many),
     )
-    how = expected if reported is None else reported.repeated(many).expected
+    how = expected_measurement if reported is None else reported.repeat(many).expected_measurement
     seen = how(kind, points.reshape(size, -1), poses).reshape(kind.size, many, count)
-    mean = _weighted(seen, of_mean)
+    mean = _weighted_moments(seen, of_mean)
     for angle in range(2):
-        sin = _weighted(np.sin(seen[angle])[np.newaxis], of_mean)[0]
-        cos = _weighted(np.cos(seen[angle])[np.newaxis], of_mean)[0]
+        sin = _weighted_moments(np.sin(seen[angle])[np.newaxis], of_mean)[0]
+        cos = _weighted_moments(np.cos(seen[angle])[np.newaxis], of_mean)[0]
         mean[angle] = np.arctan2(sin, cos)
     flat = np.repeat(mean[:, np.newaxis], many, axis=1).reshape(kind.size, -1)
     apart = residual(seen.reshape(kind.size, -1), flat).reshape(seen.shape)
     weighted = apart * of_covariance[:, np.newaxis]
-    total = product_transposed(weighted, apart)
-    cross = product_transposed(points - state[:, np.newaxis], weighted)
+    total = multiply_by_transpose(weighted, apart)
+    cross = multiply_by_transpose(points - state[:, np.newaxis], weighted)
     root = cholesky(covariance)
     slope = solve_upper(root, solve_lower(root, cross)).swapaxes(0, 1)
     # As a sum of squares it keeps its sign, which the difference of the two would lose.
@@ -143,11 +143,11 @@ def unscented_moments(
     rest = apart.copy()
     for k in range(size):
         rest -= slope[:, k, np.newaxis] * moved[k]
-    left_over = symmetric(product_transposed(rest * of_covariance[:, np.newaxis], rest))
+    left_over = symmetric(multiply_by_transpose(rest * of_covariance[:, np.newaxis], rest))
     return Moments(mean, symmetric(total), cross, slope, left_over)
 
 
-def _weighted(points: FloatArray, weights: FloatArray) -> FloatArray:
+def _weighted_moments(points: FloatArray, weights: FloatArray) -> FloatArray:
     total = weights[0] * points[:, 0]
     for k in range(1, points.shape[1]):
         total += weights[k] * points[:, k]

@@ -37,9 +37,9 @@ def stone_soup(
     UsageError
         It is no run's folder, or one whose detections have no errors or poses.
     """
-    from components.stone_soup.library import needs_stone_soup
+    from components.stone_soup.library import require_stone_soup
 
-    needs_stone_soup("components.export.stone_soup")
+    require_stone_soup("components.export.stone_soup")
     from components.display.recorded_run import tables_of
     from components.export.stone_soup_run import recorded_run
 

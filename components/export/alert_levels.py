@@ -55,7 +55,7 @@ def alerts_of(run: RecordedTables) -> list[Alert]:
     result = []
     rows = sorted(run.tables["alerts"].to_pylist(), key=_look)
     for (time_s, block), look in groupby(rows, key=_look):
-        now = {(block, _about(row)): row for row in look}
+        now = {(block, _subject_of(row)): row for row in look}
         # A track that its block no longer tells of is gone, and its alert with it.
         for about in [a for a in on if a[0] == block and isinstance(a[1], int) and a not in now]:
             on.pop(about).end_s = time_s
@@ -76,5 +76,5 @@ def _look(row: dict[str, Any]) -> tuple[float, str]:
     return float(row["time_s"]), row.get("block", "")
 
 
-def _about(row: dict[str, Any]) -> Any:
+def _subject_of(row: dict[str, Any]) -> Any:
     return row["target"] if row.get("track") is None else row["track"]

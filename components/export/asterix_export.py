@@ -49,8 +49,8 @@ def asterix_bytes(run: RecordedTables) -> bytes:
     )
     sic = {name: number for number, name in enumerate(blocks, start=1)}
     records = [
-        *_plots(run, sic), *_received(run, sic), *_state_tracks(run, sic), *_held_tracks(run, sic),
-        *_own(run),
+        *_plots(run, sic), *_received_reports(run, sic), *_state_tracks(run, sic),
+        *_stub_track_records(run, sic), *_ownship_reports(run),
     ]  # fmt: skip
     if not records:
         raise UsageError(
@@ -64,14 +64,14 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give a north marker with the position of the radar for each of its scans, and its plots."""
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         return
-    lines = run.stacked("detections", LINE)
-    there = np.flatnonzero(np.isfinite(lines).all(axis=0) & ~_says_where(run))
+    lines = run.stack_columns("detections", LINE)
+    there = np.flatnonzero(np.isfinite(lines).all(axis=0) & ~_has_reported_position(run))
     names = run.texts("detections", "block")
     radars = {names[row] or "" for row in there.tolist()}
     yield from _scans(run, sic, radars)
     if len(there) == 0:
         return
-    pose = run.stacked("detections", POSE, there)
+    pose = run.stack_columns("detections", POSE, there)
     unknown = ~np.isfinite(pose).all(axis=0)
     if unknown.any():
         sensor = names[int(there[np.argmax(unknown)])]
@@ -81,7 +81,7 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
         )
     lit = run.numbers("detections", "illuminated_s")[there]
     time_s = np.where(np.isfinite(lit), lit, run.numbers("detections", "time_s")[there])
-    lines = run.stacked("detections", LINE, there)
+    lines = run.stack_columns("detections", LINE, there)
     bearing, ends = sights(lines, pose)
     rate_m_s = run.numbers("detections", "range_rate_m_s")[there]
     for k, row in enumerate(there.tolist()):
@@ -101,26 +101,26 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
         )
 
 
-def _says_where(run: RecordedTables) -> BoolArray:
+def _has_reported_position(run: RecordedTables) -> BoolArray:
     """Return which detections are reports of an aircraft that says where it is."""
     if not run.has("detections", "reported_lat_deg"):
         return np.zeros(run.tables["detections"].num_rows, dtype=bool)
     return np.isfinite(run.numbers("detections", "reported_lat_deg"))
 
 
-def _received(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
+def _received_reports(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give what aircraft say of themselves, once for each position that was received.
 
     Heights are pressure altitudes.
     """
-    if "detections" not in run.tables or not _says_where(run).any():
+    if "detections" not in run.tables or not _has_reported_position(run).any():
         return
     names = ("lat_deg", "lon_deg", "alt_m", "north_m_s", "east_m_s", "climb_m_s", "s")
     reported = {name: run.numbers("detections", f"reported_{name}") for name in names}
     address = run.values("detections", "address")
     blocks, targets = (run.texts("detections", name) for name in ("block", "target"))
     sent: set[tuple[str, int, float]] = set()
-    for row in np.flatnonzero(_says_where(run)).tolist():
+    for row in np.flatnonzero(_has_reported_position(run)).tolist():
         say = {name: float(values[row]) for name, values in reported.items()}
         key = blocks[row] or "", int(address[row]), say["s"]
         if key in sent or not np.isfinite(say["s"]):
@@ -144,7 +144,7 @@ def _received(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecor
 def _scans(run: RecordedTables, sic: dict[str, int], radars: set[str]) -> Iterator[AsterixRecord]:
     if "scans" not in run.tables:
         return
-    positions = run.stacked("scans", POSE[:3]).T.tolist()
+    positions = run.stack_columns("scans", POSE[:3]).T.tolist()
     times = run.numbers("scans", "time_s").tolist()
     for name, time_s, position in zip(run.texts("scans", "block"), times, positions, strict=True):
         if (name or "") in radars:
@@ -166,14 +166,14 @@ def _track(
 
 
 def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
-    """Give estimated tracks, at the instants that their states speak of."""
+    """Give estimated tracks, at the instants for which their states are valid."""
     rows, positions = estimated_positions(run)
     if len(rows) == 0:
         return
-    origin = run.stacked("state_tracks", ORIGIN, rows)
+    origin = run.stack_columns("state_tracks", ORIGIN, rows)
     # Velocities and errors are along the axes of the frame's origin; the track's own have turned.
     turned = frame_change(origin, positions)
-    moves = turned.vectors(run.stacked("state_tracks", VELOCITY, rows))
+    moves = turned.vectors(run.stack_columns("state_tracks", VELOCITY, rows))
     table = {name: run.numbers("state_tracks", name) for name in COVARIANCE.values()}
     spread = turned.covariances(full_covariance(table, rows))
     errors = np.sqrt(np.maximum(np.stack([spread[i, i] for i in _ERRORS.values()]), 0.0))
@@ -198,7 +198,7 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
         yield AsterixRecord(SYSTEM_TRACKS, time_s, values)
 
 
-def _held_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
+def _stub_track_records(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Give what trackers hold of each target, once for each measurement, at its instant."""
     rows, positions = held_positions(run)
     if len(rows) == 0:
@@ -213,7 +213,7 @@ def _held_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRe
         yield AsterixRecord(SYSTEM_TRACKS, *_track(*what))
 
 
-def _own(run: RecordedTables) -> Iterator[AsterixRecord]:
+def _ownship_reports(run: RecordedTables) -> Iterator[AsterixRecord]:
     """Give the ownship's flight as it would broadcast it."""
     if "truth" not in run.tables:
         return

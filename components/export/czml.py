@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.display.recorded_run import RecordedTables
-from components.export.globe_run import DETECTION_LASTS_S, Course, globe_run, when
+from components.export.globe_run import DETECTION_LASTS_S, Course, globe_run, iso_time
 
 
 def czml_text(run: RecordedTables) -> str:
@@ -22,7 +22,8 @@ def czml_text(run: RecordedTables) -> str:
             "name": shown.name,
             "version": "1.0",
             "clock": {
-                "interval": f"{when(0.0)}/{when(shown.end_s)}", "currentTime": when(0.0),
+                "interval": f"{iso_time(0.0)}/{iso_time(shown.end_s)}",
+                "currentTime": iso_time(0.0),
                 "multiplier": 1,
             },
         }
@@ -37,13 +38,14 @@ def czml_text(run: RecordedTables) -> str:
             "outlineColor": {"rgba": _rgba(one.colour)}, "outlineWidth": 1 + min(one.level, 3),
         }  # fmt: skip
         words = _label(f"alert {one.level}", one.colour, below=True)
-        packets.append(_placed(f"alert/{number}", one) | {"point": ring} | words)
+        packets.append(_course_packet(f"alert/{number}", one) | {"point": ring} | words)
     for number, seen in enumerate(shown.seen):
         packets.append(
             {
                 "id": f"detection/{number}",
                 "name": seen.name,
-                "availability": f"{when(seen.time_s)}/{when(seen.time_s + DETECTION_LASTS_S)}",
+                "availability": f"{iso_time(seen.time_s)}/"
+                f"{iso_time(seen.time_s + DETECTION_LASTS_S)}",
                 "position": {"cartographicDegrees": list(seen.position)},
                 "point": {
                     "pixelSize": 4, "color": {"rgba": _rgba(shown.marks[seen.sensor].colour)},
@@ -53,14 +55,14 @@ def czml_text(run: RecordedTables) -> str:
     return json.dumps(packets, ensure_ascii=False, allow_nan=False, indent=0) + "\n"
 
 
-def _placed(number: str, one: Course) -> dict[str, Any]:
+def _course_packet(number: str, one: Course) -> dict[str, Any]:
     samples = np.column_stack([one.time_s, one.position]).ravel().tolist()
     return {
         "id": number,
         "name": one.name,
-        "availability": f"{when(one.time_s[0])}/{when(one.time_s[-1])}",
+        "availability": f"{iso_time(one.time_s[0])}/{iso_time(one.time_s[-1])}",
         "position": {
-            "epoch": when(0.0),
+            "epoch": iso_time(0.0),
             "cartographicDegrees": samples,
             "interpolationAlgorithm": "LINEAR",
         },
@@ -70,7 +72,10 @@ def _placed(number: str, one: Course) -> dict[str, Any]:
 def _moving(number: str, one: Course, size: int, width: int) -> dict[str, Any]:
     colour = {"rgba": _rgba(one.colour)}
     path = {"width": width, "leadTime": 0, "material": {"solidColor": {"color": colour}}}
-    return _placed(number, one) | {"point": {"pixelSize": size, "color": colour}, "path": path}
+    return _course_packet(number, one) | {
+        "point": {"pixelSize": size, "color": colour},
+        "path": path,
+    }
 
 
 def _label(text: str, colour: str, below: bool = False) -> dict[str, Any]:

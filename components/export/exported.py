@@ -18,7 +18,7 @@ from components.export.mcap_export import mcap_bytes
 from components.export.operator_answers import operator_csv
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import check_file, write_file
-from dsa_des.files.output_names import named
+from dsa_des.files.output_names import user_path
 from dsa_des.terminal.terminal import say
 
 _MATLAB_NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,62}")
@@ -38,7 +38,7 @@ def export_run(
     tables = read_tables(run)
     folder = tables.folder.resolve()
     target = (
-        named(out)
+        user_path(out)
         if out is not None
         else folder.with_name(f"{folder.name}{_ENDINGS.get(to, f'.{to}')}")
     )
@@ -78,7 +78,7 @@ def _check_options(to: str, **given: float | None) -> None:
 
 
 def _geoid(tables: RecordedTables, given_m: float | None) -> tuple[str, float]:
-    """Return the geoid's height above the ellipsoid, and what is to be said of it."""
+    """Return the geoid's height above the ellipsoid, and a note on it."""
     known_m = undulation_of(tables)
     if given_m is not None:
         said, geoid_m = "", given_m

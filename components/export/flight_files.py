@@ -79,7 +79,7 @@ def xyz_text(run: RecordedTables, step_s: float = STEP_S) -> str:
     return "\n".join([head, *_XYZ_HEAD, *_rows(run, step_s, columns)]) + "\n"
 
 
-def _at_steps(name: str, flight: Mapping[str, FloatArray], step_s: float) -> dict[str, FloatArray]:
+def _resample(name: str, flight: Mapping[str, FloatArray], step_s: float) -> dict[str, FloatArray]:
     """Return a flight at multiples of a step: by cubics that keep places and velocities.
 
     Velocities are straight between those of the neighbours.
@@ -124,7 +124,7 @@ def _rows(
         if any(c in name for c in ",;\t\n\r ") or not name:
             raise UsageError(f"{run.folder}: the name {name!r} holds what separates cells: rename")
         if step_s:
-            flight = _at_steps(name, flight, step_s)
+            flight = _resample(name, flight, step_s)
         if number == 0 and len(flight["time_s"]) == 0:
             raise UsageError(
                 f"{run.folder}: --step-s {step_s:g}: the ownship flies at no multiple of it: give "

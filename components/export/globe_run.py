@@ -36,7 +36,7 @@ class Course:
     #: Of an alert, else 0.
     level: int = 0
 
-    def between(self, start_s: float, end_s: float) -> tuple[FloatArray, FloatArray]:
+    def cut(self, start_s: float, end_s: float) -> tuple[FloatArray, FloatArray]:
         """Return times and positions from start to end, both straight between the neighbours."""
         start_s, end_s = (float(np.clip(t, *self.time_s[[0, -1]])) for t in (start_s, end_s))
         inside = (self.time_s > start_s) & (self.time_s < end_s)
@@ -88,7 +88,7 @@ def globe_run(run: RecordedTables) -> GlobeRun:
     ]  # fmt: skip
     end_s = max(float(one.time_s[-1]) for one in flights)
     seen = list(seen_positions(run))
-    tracks = [*_estimated(run), *_held(run)]
+    tracks = [*_estimated_courses(run), *_held_courses(run)]
     marks = marks_in(run, {one.sensor for one in seen} | {one.group for one in tracks})
     painted = [
         Course(one.name, marks[one.group].colour, one.time_s, one.position, one.group)
@@ -97,10 +97,10 @@ def globe_run(run: RecordedTables) -> GlobeRun:
     alerts = [
         Course(
             f"{alert.name}: alert {level}", LEVELS_ON_DARK[min(level, 3) - 1],
-            *about.between(start_s, stop_s), alert.block, level,
+            *about.cut(start_s, stop_s), alert.block, level,
         )
         for alert in alerts_of(run)
-        if (about := _about(alert, flights, tracks)) is not None
+        if (about := _course_of_alert(alert, flights, tracks)) is not None
         for start_s, stop_s, level in alert.stretches(end_s)
         if start_s <= about.time_s[-1] and stop_s >= about.time_s[0]
     ]  # fmt: skip
@@ -108,7 +108,7 @@ def globe_run(run: RecordedTables) -> GlobeRun:
     return GlobeRun(name, end_s, flights, painted, alerts, seen, marks)
 
 
-def when(time_s: float) -> str:
+def iso_time(time_s: float) -> str:
     """Return an instant of a run as globes have it (ISO 8601)."""
     moment = START + timedelta(microseconds=round(1e6 * time_s))
     return moment.isoformat().replace("+00:00", "Z")
@@ -122,7 +122,9 @@ def marks_in(run: RecordedTables, names: set[str]) -> dict[str, Mark]:
         return block_marks(dict.fromkeys(names, ""))
 
 
-def _about(alert: Alert, flights: Sequence[Course], tracks: Sequence[Course]) -> Course | None:
+def _course_of_alert(
+    alert: Alert, flights: Sequence[Course], tracks: Sequence[Course]
+) -> Course | None:
     """Return the flight of an alert's target, or else its track's course."""
     if alert.target is not None:
         return next((one for one in flights if one.name == alert.target), None)
@@ -137,13 +139,13 @@ def seen_positions(run: RecordedTables) -> Iterator[DetectedPlace]:
     if "detections" not in run.tables:
         return
     names = ("time_s", *LINE, *POSE)
-    number = run.stacked("detections", names)
+    number = run.stack_columns("detections", names)
     there = np.flatnonzero(~np.isnan(number).any(axis=0))
     known = np.where(np.isnan(number), 0.0, number)
     run.refuse_large("detections", dict(zip(names, known, strict=True)))
     if len(there) == 0:
         return
-    number = run.stacked("detections", names, there)
+    number = run.stack_columns("detections", names, there)
     _, (lat, lon, alt) = sights(number[1:4], number[4:])
     sensors, targets = (run.texts("detections", name) for name in ("block", "target"))
     rows = zip(*(part.tolist() for part in (there, number[0], lon, lat, alt)), strict=True)
@@ -151,7 +153,7 @@ def seen_positions(run: RecordedTables) -> Iterator[DetectedPlace]:
         yield DetectedPlace(sensors[row] or "", targets[row] or "", at_s, tuple(position))
 
 
-def _estimated(run: RecordedTables) -> Iterator[Course]:
+def _estimated_courses(run: RecordedTables) -> Iterator[Course]:
     """Give tracks that were ever confirmed, until they are deleted."""
     rows, positions = estimated_positions(run)
     if len(rows) == 0:
@@ -162,7 +164,7 @@ def _estimated(run: RecordedTables) -> Iterator[Course]:
     names = [(blocks[row] or "", f"#{n}") for row, n in zip(rows.tolist(), numbers, strict=True)]
     lives = status != "deleted"
     sure = np.isin(status, HELD)
-    for name, mine in _grouped(names):
+    for name, mine in _group_names(names):
         if sure[mine].any():
             mine = mine[lives[mine]]
             yield _course(
@@ -170,17 +172,17 @@ def _estimated(run: RecordedTables) -> Iterator[Course]:
             )
 
 
-def _held(run: RecordedTables) -> Iterator[Course]:
+def _held_courses(run: RecordedTables) -> Iterator[Course]:
     rows, positions = held_positions(run)
     blocks, targets = (
         (run.texts("tracks", name) for name in ("block", "target")) if len(rows) else ([], [])
     )
     names = [(blocks[row] or "", targets[row] or "") for row in rows.tolist()]
-    for name, mine in _grouped(names):
+    for name, mine in _group_names(names):
         yield _course(name, run.numbers("tracks", "measured_s")[rows[mine]], positions[:, mine])
 
 
-def _grouped(names: Sequence[tuple[str, str]]) -> Iterator[tuple[tuple[str, str], IntArray]]:
+def _group_names(names: Sequence[tuple[str, str]]) -> Iterator[tuple[tuple[str, str], IntArray]]:
     """Give each name and its indices in the sequence, in order of names."""
     result: dict[tuple[str, str], list[int]] = {}
     for position, name in enumerate(names):

@@ -5,7 +5,7 @@ from xml.sax.saxutils import escape
 
 from components.display.recorded_run import RecordedTables
 from components.display.symbols import LEVELS_ON_DARK
-from components.export.globe_run import Course, DetectedPlace, GlobeRun, globe_run, when
+from components.export.globe_run import Course, DetectedPlace, GlobeRun, globe_run, iso_time
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError
 from dsa_des.text.safe_text import printable
@@ -42,8 +42,8 @@ def kml_text(run: RecordedTables, geoid_m: float = 0.0) -> str:
         "<Document>",
         f"<name>{_xml(shown.name)}</name>",
         f"<description>Heights above sea level: those of the run, above the WGS 84 ellipsoid, less "
-        f"{geoid_m:g} m for the geoid. Second 0 is {when(0.0)}.</description>",
-        *_look_at(shown, geoid_m),
+        f"{geoid_m:g} m for the geoid. Second 0 is {iso_time(0.0)}.</description>",
+        *_look_at_lines(shown, geoid_m),
         *_styles(shown),
     ]
     lines += _folder("Aircraft", _courses(shown.flights, "aircraft", geoid_m))
@@ -57,7 +57,7 @@ def kml_text(run: RecordedTables, geoid_m: float = 0.0) -> str:
     return "\n".join([*lines, "</Document>", "</kml>", ""])
 
 
-def _look_at(shown: GlobeRun, geoid_m: float) -> list[str]:
+def _look_at_lines(shown: GlobeRun, geoid_m: float) -> list[str]:
     """Return where a globe looks when it opens the file: at where the ownship begins."""
     lon, lat, alt = shown.flights[0].position[0].tolist()
     return [
@@ -126,7 +126,7 @@ def _courses(courses: Sequence[Course], style: str, geoid_m: float) -> list[str]
             f"<Placemark><name>{_xml(one.name)}</name>",
             f"<styleUrl>#{_id(of_one)}</styleUrl><gx:Track>",
             "<altitudeMode>absolute</altitudeMode>",
-            *(f"<when>{when(t)}</when>" for t in one.time_s.tolist()),
+            *(f"<when>{iso_time(t)}</when>" for t in one.time_s.tolist()),
             *_coordinates(one.position, geoid_m),
             "</gx:Track></Placemark>",
         ]
@@ -144,7 +144,7 @@ def _points(seen: Sequence[DetectedPlace], geoid_m: float) -> list[str]:
         lon, lat, alt = one.position
         lines += [
             f"<Placemark><name>{_xml(one.name)}</name>",
-            f"<TimeStamp><when>{when(one.time_s)}</when></TimeStamp>",
+            f"<TimeStamp><when>{iso_time(one.time_s)}</when></TimeStamp>",
             f"<styleUrl>#{_id(f'sensor-{one.sensor}')}</styleUrl><Point>",
             f"<altitudeMode>absolute</altitudeMode>"
             f"<coordinates>{lon},{lat},{alt - geoid_m}</coordinates>",

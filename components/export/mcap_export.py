@@ -36,7 +36,7 @@ def _object(**properties: Any) -> dict[str, Any]:
     return {"type": "object", "properties": properties}
 
 
-def _several(**properties: Any) -> dict[str, Any]:
+def _object_schema(**properties: Any) -> dict[str, Any]:
     return {"type": "array", "items": _object(**properties)}
 
 
@@ -51,15 +51,15 @@ _FOXGLOVE = {
     ),
     "foxglove.PoseInFrame": _object(timestamp=_TIME, frame_id=_TEXT, pose=_POSE),
     "foxglove.SceneUpdate": _object(
-        deletions=_several(timestamp=_TIME, type={"type": "integer"}, id=_TEXT),
-        entities=_several(
+        deletions=_object_schema(timestamp=_TIME, type={"type": "integer"}, id=_TEXT),
+        entities=_object_schema(
             timestamp=_TIME,
             frame_id=_TEXT,
             id=_TEXT,
             lifetime=_TIME,
             frame_locked={"type": "boolean"},
-            metadata=_several(key=_TEXT, value=_TEXT),
-            spheres=_several(pose=_POSE, size=_VECTOR, color=_COLOUR),
+            metadata=_object_schema(key=_TEXT, value=_TEXT),
+            spheres=_object_schema(pose=_POSE, size=_VECTOR, color=_COLOUR),
         ),
     ),
 }
@@ -88,7 +88,7 @@ def mcap_bytes(run: RecordedTables) -> bytes:
         return channels[topic]
 
     messages: list[tuple[int, int, int, bytes]] = []
-    for topic, name, schema, at_ns, content in (*_tables(run), *_drawn(run)):
+    for topic, name, schema, at_ns, content in (*_tables(run), *_scene_messages(run)):
         data = json.dumps(content, ensure_ascii=False, allow_nan=False).encode()
         messages.append((at_ns, channel(topic, name, schema), len(messages), data))
     messages.sort(key=lambda one: one[:3])
@@ -106,7 +106,7 @@ def _tables(run: RecordedTables) -> Iterator[_Message]:
     for name, table in sorted(run.tables.items()):
         if "time_s" not in table.column_names:
             continue
-        schema = _object(**{field.name: _described(field) for field in table.schema})
+        schema = _object(**{field.name: _column_schema(field) for field in table.schema})
         when = run.numbers(name, "time_s")
         run.refuse_large(name, {"time_s": when})
         for row, time_s in zip(table.to_pylist(), when.tolist(), strict=True):
@@ -117,7 +117,7 @@ def _tables(run: RecordedTables) -> Iterator[_Message]:
             yield f"/tables/{name}", f"dsa_des.{name}", schema, _instant(time_s), plain
 
 
-def _described(field: Any) -> dict[str, Any]:
+def _column_schema(field: Any) -> dict[str, Any]:
     """Return the schema of a column: its type, its unit and frame, its meaning."""
     import pyarrow as pa
 
@@ -134,7 +134,7 @@ def _described(field: Any) -> dict[str, Any]:
     return result | ({"description": "; ".join(words)} if words else {})
 
 
-def _drawn(run: RecordedTables) -> Iterator[_Message]:
+def _scene_messages(run: RecordedTables) -> Iterator[_Message]:
     """Give flights and detections, around where the ownship begins."""
     flights = run.flights() if "truth" in run.tables else {}
     origin: tuple[float, ...] | None = None

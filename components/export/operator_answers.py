@@ -33,7 +33,7 @@ def operator_csv(run: RecordedTables) -> bytes:
             raise UsageError(f"{run.folder}: has no {name}.parquet, which {needed} records")
     decisions = run.tables["decisions"].to_pylist()
     taken: set[int] = set()
-    rows = [_answered(alert, names, decisions, taken) for alert, names in _alerts(run)]
+    rows = [_alert_row(alert, names, decisions, taken) for alert, names in _alerts(run)]
     stream = io.StringIO()
     writer = csv.DictWriter(stream, _COLUMNS, lineterminator="\n")
     writer.writeheader()
@@ -53,7 +53,7 @@ def _alerts(run: RecordedTables) -> list[tuple[dict[str, Any], set[str | None]]]
     return result
 
 
-def _answered(
+def _alert_row(
     alert: dict[str, Any],
     names: set[str | None],
     decisions: list[dict[str, Any]],

@@ -87,7 +87,7 @@ def attitude_from_path(
     moving = speed >= SLOWEST_TRACK_MPS
     across = v_north * acceleration[0] - v_east * acceleration[1]
     across = across / np.where(moving, speed, 1.0)
-    yaw = wrap_heading_rad(_held(np.arctan2(v_east, v_north), moving))
+    yaw = wrap_heading_rad(_hold_yaw(np.arctan2(v_east, v_north), moving))
     pitch = np.where(moving, np.arctan2(v_up, np.where(moving, speed, 1.0)), 0.0)
     roll = np.where(moving, np.arctan2(across, STANDARD_GRAVITY_M_S2), 0.0)
     return yaw, pitch, roll
@@ -179,7 +179,7 @@ def _ratio(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
     return np.where(usable, numerator / np.where(usable, denominator, 1.0), 0.0)
 
 
-def _held(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
+def _hold_yaw(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
     """Carry the last yaw of a moving sample over those that stand still."""
     if moving.all():
         return yaw

@@ -72,7 +72,7 @@ class TrafficEnvelope:
 
 def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) -> TrafficEnvelope:
     """Bound a run's lines of sight up to a reach."""
-    times, half_s = _spread(duration_s, len(fleet))
+    times, half_s = _sample_instants(duration_s, len(fleet))
     own_state, states = own.at(times), fleet.at(times)
     own_moves = _moves_m(own.max_speed_mps, half_s)
     moves = _moves_m(fleet.max_speeds_mps, half_s)
@@ -116,7 +116,7 @@ def true_reaches_m(own: Fleet, targets: int, duration_s: float, look: FarthestLo
     """
     reaches_m: FloatArray = np.full(len(own), look.range_m)
     if look.seeming:
-        times, half_s = _spread(duration_s, targets)
+        times, half_s = _sample_instants(duration_s, targets)
         for run, speed_mps in enumerate(own.max_speeds_mps.tolist()):
             state = own.each(np.full(len(times), run), times)
             latitudes, alt, _ = _place(state, _moves_m(speed_mps, half_s))
@@ -125,7 +125,7 @@ def true_reaches_m(own: Fleet, targets: int, duration_s: float, look: FarthestLo
     return reaches_m
 
 
-def _spread(duration_s: float, targets: int) -> tuple[FloatArray, float]:
+def _sample_instants(duration_s: float, targets: int) -> tuple[FloatArray, float]:
     """Return times in the middle of as many equal parts as are affordable, and half of one."""
     count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, targets))
     intervals = max(1, math.ceil(count))
@@ -168,14 +168,14 @@ def _moves_m(speed_mps: Any, half_s: float) -> Any:
     return _SPEED_MARGIN * speed_mps * half_s + _POSITION_MARGIN_M
 
 
-def _once_a_second(own_at: FlightAt, duration_s: float) -> tuple[FloatArray, TrajectoryState]:
+def _states_each_second(own_at: FlightAt, duration_s: float) -> tuple[FloatArray, TrajectoryState]:
     times = np.linspace(0.0, duration_s, min(math.ceil(duration_s), _MOST_SAMPLES) + 1)
     return times, own_at(times)
 
 
 def check_above_terrain(own_at: FlightAt, terrain_m: float, duration_s: float) -> None:
     """Refuse terrain that the ownship does not fly above."""
-    times, state = _once_a_second(own_at, duration_s)
+    times, state = _states_each_second(own_at, duration_s)
     hit = np.flatnonzero((state.alt_m <= terrain_m) & state.present)
     if len(hit):
         first = hit[0]
@@ -189,7 +189,7 @@ def check_on_raster(
     own_at: FlightAt, raster: ElevationRaster, offset_m: float, duration_s: float
 ) -> None:
     """Refuse a raster over which the ownship never flies, or whose ground it flies through."""
-    times, state = _once_a_second(own_at, duration_s)
+    times, state = _states_each_second(own_at, duration_s)
     there = np.flatnonzero(state.present)
     ground, inside = raster.height(state.lat_deg[there], state.lon_deg[there])
     if len(there) and not inside.any():

@@ -3,8 +3,8 @@
 Distances are compared at given times. A target that is d away at one of them is nowhere nearer
 than d - v·dt up to a time dt before or after it, with v the sum of the two largest speeds: a
 stretch of time in which that leaves nothing nearer than what is known already is not looked at.
-The result is that of looking at every time, to the bit. `look_between` then looks between the
-nearest of these times and its neighbours.
+The result is that of looking at every time, to the bit. `refine_between_samples` then looks between
+the nearest of these times and its neighbours.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,10 +39,10 @@ def regular_count(step_s: float, duration_s: float) -> int:
 class SampleTimes(Protocol):
     """Times in order, for each of many targets."""
 
-    def at(self, target: IntArray, number: IntArray) -> FloatArray:
+    def time_of(self, target: IntArray, number: IntArray) -> FloatArray:
         """Return the time (n,) of each target's sample of a number, s."""
 
-    def between(
+    def numbers_between(
         self, target: IntArray, first_s: FloatArray, last_s: FloatArray
     ) -> tuple[IntArray, IntArray]:
         """Return the numbers of the first and the last sample in [first_s, last_s], all (n,).
@@ -58,11 +58,11 @@ class RegularTimes:
     step_s: float
     duration_s: float
 
-    def at(self, target: IntArray, number: IntArray) -> FloatArray:
+    def time_of(self, target: IntArray, number: IntArray) -> FloatArray:
         """Return the time of each sample."""
         return regular_times_s(self.step_s, number)
 
-    def between(
+    def numbers_between(
         self, target: IntArray, first_s: FloatArray, last_s: FloatArray
     ) -> tuple[IntArray, IntArray]:
         """Return the numbers of the first and the last sample in each interval."""
@@ -70,11 +70,11 @@ class RegularTimes:
         guess = np.minimum(np.maximum(first_s, 0.0), self.duration_s) / self.step_s
         first = np.maximum(guess.astype(np.int64) - 1, 0)
         for _ in range(3):  # the division and the rounding are wrong by less than a step each
-            first += self.at(target, first) < first_s
+            first += self.time_of(target, first) < first_s
         guess = np.minimum(np.maximum(last_s, -self.step_s), self.duration_s) / self.step_s
         last = np.minimum(np.floor(guess).astype(np.int64) + 1, end)
         for _ in range(3):
-            last -= self.at(target, last) > last_s
+            last -= self.time_of(target, last) > last_s
         return first, last
 
 
@@ -82,14 +82,14 @@ class KnownTimes:
     """Every target has times of its own (samples,), ascending; those of one alone are all's."""
 
     def __init__(self, *times_s: FloatArray) -> None:
-        self._find = PieceSearch.of(times_s)
+        self._find = PieceSearch.from_starts(times_s)
         self._of_each = np.asarray(len(times_s) > 1)
 
-    def at(self, target: IntArray, number: IntArray) -> FloatArray:
+    def time_of(self, target: IntArray, number: IntArray) -> FloatArray:
         """Return the time of each sample."""
         return self._find.starts_s[self._find.first[target * self._of_each] + number]
 
-    def between(
+    def numbers_between(
         self, target: IntArray, first_s: FloatArray, last_s: FloatArray
     ) -> tuple[IntArray, IntArray]:
         """Return the numbers of the first and the last sample in each interval."""
@@ -119,7 +119,7 @@ class Approaches:
     range_m: FloatArray
 
     @classmethod
-    def none(cls, targets: int) -> "Approaches":
+    def unknown(cls, targets: int) -> "Approaches":
         """Return what is known before anything was looked at."""
         return cls(np.full(targets, np.nan), np.full(targets, np.inf))
 
@@ -140,9 +140,9 @@ def closest_approaches(
     is improved in place.
     """
     closing = closing_speed_mps * _SPEED_MARGIN
-    best = Approaches.none(len(closing)) if best is None else best
+    best = Approaches.unknown(len(closing)) if best is None else best
     target = np.arange(len(closing))
-    first, last = times.between(target, *present_s)
+    first, last = times.numbers_between(target, *present_s)
     some = first <= last
     waiting = [(target[some], first[some], last[some])]
     while waiting:
@@ -151,10 +151,12 @@ def closest_approaches(
             waiting.append((target[MOST_AT_ONCE:], first[MOST_AT_ONCE:], last[MOST_AT_ONCE:]))
             target, first, last = (a[:MOST_AT_ONCE] for a in (target, first, last))
         middle = (first + last) // 2
-        time_s = times.at(target, middle)
-        range_m, there = _apart(own_at(target, time_s), targets_at(target, time_s))
+        time_s = times.time_of(target, middle)
+        range_m, there = _slant_ranges(own_at(target, time_s), targets_at(target, time_s))
         _improve(best, target[there], time_s[there], range_m[there])
-        away_s = np.maximum(time_s - times.at(target, first), times.at(target, last) - time_s)
+        away_s = np.maximum(
+            time_s - times.time_of(target, first), times.time_of(target, last) - time_s
+        )
         nearest_m = range_m - closing[target] * away_s - _RANGE_MARGIN_M
         open_ = nearest_m <= best.range_m[target]
         before, after = open_ & (first < middle), open_ & (middle < last)
@@ -178,7 +180,7 @@ STEP_S = 0.1
 _NEARER_M = 1e-3
 
 
-def look_between(
+def refine_between_samples(
     own_at: Callable[[IntArray, FloatArray], Any],
     targets_at: Callable[[IntArray, FloatArray], Any],
     step_s: FloatArray,
@@ -198,7 +200,7 @@ def look_between(
             np.maximum(middle - reach, present_s[0][target]),
             np.minimum(middle + reach, present_s[1][target]),
         )
-        before, after = (_apart(own_at(target, t), targets_at(target, t))[0] for t in ends)
+        before, after = (_slant_ranges(own_at(target, t), targets_at(target, t))[0] for t in ends)
         square = best.range_m[target] ** 2
         with np.errstate(invalid="ignore", divide="ignore"):
             rising = (square - before**2) / (middle - ends[0])
@@ -208,12 +210,12 @@ def look_between(
         some = np.flatnonzero(np.isfinite(vertex) & (bend > 0.0))
         time_s = np.round(np.clip(vertex, *ends)[some], _DIGITS)
         here = target[some]
-        range_m, there = _apart(own_at(here, time_s), targets_at(here, time_s))
+        range_m, there = _slant_ranges(own_at(here, time_s), targets_at(here, time_s))
         nearer = there & (range_m < best.range_m[here] - _NEARER_M)
         best.range_m[here[nearer]], best.time_s[here[nearer]] = range_m[nearer], time_s[nearer]
 
 
-def _apart(own: Any, other: Any) -> tuple[FloatArray, Any]:
+def _slant_ranges(own: Any, other: Any) -> tuple[FloatArray, Any]:
     """Return slant ranges between two states, and whether both are there."""
     range_m = slant_range_m(
         own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m
@@ -244,7 +246,7 @@ def censored_approaches(
 ) -> list[str]:
     """Say of each closest approach whether it is at an end of what was looked at."""
     present_s = np.array(present_together_s(own, targets.intervals_present_s, end_s))
-    looked_s = np.array(_looked_at_s(compared_at, *present_s))
+    looked_s = np.array(_sample_span_s(compared_at, *present_s))
     return [
         end_of_look(time, looked_s[:, number], present_s[:, number], end_s)
         for number, time in enumerate(time_s.tolist())
@@ -271,17 +273,17 @@ def present_together_s(
     )
 
 
-def _looked_at_s(
+def _sample_span_s(
     compared_at: Sequence[SampleTimes], begin_s: FloatArray, end_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the first and the last sample (targets,) in [begin_s, end_s]; NaN without any."""
     first, last = np.full(len(begin_s), np.nan), np.full(len(begin_s), np.nan)
     for times in compared_at:
         targets = np.arange(len(begin_s))
-        low, high = times.between(targets, begin_s, end_s)
+        low, high = times.numbers_between(targets, begin_s, end_s)
         some = np.flatnonzero(high >= low)
-        first[some] = np.fmin(first[some], times.at(some, low[some]))
-        last[some] = np.fmax(last[some], times.at(some, high[some]))
+        first[some] = np.fmin(first[some], times.time_of(some, low[some]))
+        last[some] = np.fmax(last[some], times.time_of(some, high[some]))
     return first, last
 
 
@@ -289,7 +291,7 @@ def approaches_of_run(
     own: Trajectory, targets: Fleet, times: Sequence[SampleTimes], end_s: float, *, between: bool
 ) -> Approaches:
     """Return how near targets come over a run, compared at some times, and `between` them too."""
-    best, speeds = Approaches.none(len(targets)), targets.max_speeds_mps
+    best, speeds = Approaches.unknown(len(targets)), targets.max_speeds_mps
     present_s = present_together_s(own, targets.intervals_present_s, end_s)
     flights = (lambda _, time_s: own.at(time_s)), targets.each
     for some in times:
@@ -298,5 +300,5 @@ def approaches_of_run(
             closing_speed_mps=speeds + own.max_speed_mps, present_s=present_s, best=best,
         )  # fmt: skip
     if between:
-        look_between(*flights, np.full(len(speeds), STEP_S), present_s, best)
+        refine_between_samples(*flights, np.full(len(speeds), STEP_S), present_s, best)
     return best

@@ -85,17 +85,17 @@ def solve(approach: Approach) -> tuple[FloatArray, FloatArray, FloatArray, BoolA
     side = np.where(a.horizontal_m < 0.0, 1.0, -1.0)
     angle = np.arctan2(east, north) + side * off
     for _ in range(_ROUNDS):
-        lat, lon, altitude = _placed(a, angle)
+        lat, lon, altitude = _place_paths(a, angle)
         value = _closing(a, lat, lon, altitude)
         # The derivative in the plane: Newton on the angle converges at once.
         slope = distance * (east * np.cos(angle) - north * np.sin(angle))
         step = np.where(possible & (np.abs(slope) > 0.0), value / np.where(slope, slope, 1.0), 0.0)
         angle = angle - step
-    lat, lon, altitude = _placed(a, angle)
+    lat, lon, altitude = _place_paths(a, angle)
     return lat, lon, altitude, possible
 
 
-def _placed(a: Approach, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _place_paths(a: Approach, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     distance = np.abs(a.horizontal_m)
     altitude = a.altitude_m[0] + a.vertical_m
     up = a.vertical_m.copy()
@@ -127,7 +127,7 @@ def _closing(a: Approach, lat: FloatArray, lon: FloatArray, altitude: FloatArray
     return level if a.sense == "horizontal" else level - d * v_up
 
 
-def flown(
+def fly_paths(
     approach: Approach, closest_s: FloatArray, time_s: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """Return both flights over time, shape (2, n, instants), and which encounters there are."""
@@ -150,7 +150,7 @@ def flown(
     return lats, lons, alts, possible
 
 
-def in_plane(
+def project_to_plane(
     lat_deg: FloatArray, lon_deg: FloatArray, reference_deg: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
     """Return north and east (m) of points in the plane that touches the ellipsoid at a reference.

@@ -36,11 +36,11 @@ class NearIntervals:
     start_s: FloatArray
     end_s: FloatArray
 
-    def near(self, columns: IntArray, time_s: FloatArray, lasts_s: float) -> BoolArray:
+    def may_be_near(self, columns: IntArray, time_s: FloatArray, lasts_s: float) -> BoolArray:
         """Return which targets may be near during looks from times on, (rows, targets).
 
-        `columns` are those of `during` all of these looks: which of them are near at which one does
-        not depend on the window.
+        `columns` are those of `targets_near` all of these looks: which of them are near at which
+        one does not depend on the window.
         """
         always = (self.start_s <= time_s.min() + lasts_s) & (self.end_s >= time_s.max())
         if np.count_nonzero(always) == len(columns):
@@ -58,7 +58,7 @@ class NearIntervals:
         near[order] = np.cumsum(change[:-1], axis=0, dtype=np.int8) > 0
         return near
 
-    def during(self, first_s: float, last_s: float) -> IntArray:
+    def targets_near(self, first_s: float, last_s: float) -> IntArray:
         """Return the targets that may be near at some time in [first_s, last_s], ascending."""
         met = (self.start_s <= last_s) & (self.end_s >= first_s)
         return np.unique(self.target[met])
@@ -114,7 +114,7 @@ def near_intervals(
         drift = closing[target] * half + _RANGE_MARGIN_M
         there = (present_s[0][target] <= start + length) & (present_s[1][target] >= start)
         maybe = there & (range_m <= within_m[target] + drift)
-        fine = length <= FINEST_S or _too_many(run[target], of_run)
+        fine = length <= FINEST_S or _has_too_many(run[target], of_run)
         settled = maybe & ((range_m <= within_m[target] - drift) | fine)
         kept.append((target[settled], start[settled], start[settled] + length))
         cut = maybe & ~settled
@@ -124,16 +124,16 @@ def near_intervals(
     near, begin, end = (np.concatenate(parts) for parts in zip(*kept, strict=True))
     start, end = np.maximum(begin, present_s[0][near]), np.minimum(end, present_s[1][near])
     some = start <= end
-    return _merged(near[some], start[some], end[some])
+    return _merge_intervals(near[some], start[some], end[some])
 
 
-def _too_many(run: IntArray, of_run: int) -> BoolArray:
+def _has_too_many(run: IntArray, of_run: int) -> BoolArray:
     """Return for each piece whether its run has become too many of them."""
     too_many: BoolArray = 2 * np.bincount(run) > _MOST_PIECES_PER_TARGET * of_run
     return too_many[run]
 
 
-def _merged(target: IntArray, start_s: FloatArray, end_s: FloatArray) -> NearIntervals:
+def _merge_intervals(target: IntArray, start_s: FloatArray, end_s: FloatArray) -> NearIntervals:
     order = np.lexsort((start_s, target))
     target, start_s, end_s = target[order], start_s[order], end_s[order]
     begins: BoolArray = np.ones(len(target), dtype=bool)
@@ -187,7 +187,7 @@ class SteeredCulling:
         known = self._known[0, run]
         known[known * self.epoch_s[run] >= time_s] = -1
 
-    def near(
+    def states_and_near(
         self, own: SteeredFleet, run: IntArray, time_s: FloatArray
     ) -> tuple[TrajectoryState, BoolArray]:
         """Return the states of ownships as they are steered by now at each row, and which targets
@@ -195,7 +195,7 @@ class SteeredCulling:
         """
         rows = len(time_s)
         epoch = np.floor(time_s / self.epoch_s[run]).astype(np.int64)
-        fastest = np.maximum(own.fastest_by(run, time_s), self._own_mps[run])
+        fastest = np.maximum(own.largest_speed(run, time_s), self._own_mps[run])
         begins = np.ones(len(run), dtype=bool)
         begins[1:] = (run[1:] != run[:-1]) | (epoch[1:] != epoch[:-1])
         begins[1:] |= fastest[1:] != fastest[:-1]
@@ -209,7 +209,7 @@ class SteeredCulling:
         here = own.each(np.concatenate([run, begun]), np.concatenate([time_s, start_s])).arrays()
         if len(new):
             at_start = (values[rows:, np.newaxis] for values in here[:3])
-            range_m[new] = slant_range_m(*at_start, *self._at_start(begun, number[new]))
+            range_m[new] = slant_range_m(*at_start, *self._epoch_positions(begun, number[new]))
             self._known[0, begun, index[new]] = number[new]
             self._range_m[begun, index[new]] = range_m[new]
         closing = self._closing_mps(self._targets_mps[of], fastest[first])
@@ -217,7 +217,7 @@ class SteeredCulling:
         near = np.asarray((range_m <= within_m)[np.cumsum(begins) - 1])
         return TrajectoryState(*(values[:rows] for values in here)), near
 
-    def _at_start(self, run: IntArray, epoch: IntArray) -> FloatArray:
+    def _epoch_positions(self, run: IntArray, epoch: IntArray) -> FloatArray:
         """Return the positions (3, n, targets) of the targets of runs as epochs (n,) begin."""
         _, _, room, width = self._position.shape
         position, left = np.empty((3, len(run), width)), np.arange(len(run))

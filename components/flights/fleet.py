@@ -64,16 +64,16 @@ class Fleet(Sequence[Any]):
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Return the states of all at times (n,), shape (n, flights)."""
-        times, count = checked_times(time_s), len(self)
+        times, count = check_times(time_s), len(self)
         aircraft = np.tile(np.arange(count), len(times))
-        return self.each(aircraft, np.repeat(times, count)).reshaped((len(times), count))
+        return self.each(aircraft, np.repeat(times, count)).reshape((len(times), count))
 
     def subset(self, columns: IntArray) -> Fleet:
         """Return the fleet of some flights, given by their indices, ascending."""
         return type(self)([self[i] for i in columns.tolist()])  # type: ignore[call-arg]
 
 
-def in_blocks(
+def evaluate_in_blocks(
     state: Callable[[IntArray, FloatArray], TrajectoryState],
     aircraft: IntArray,
     time_s: FloatArray,
@@ -86,12 +86,12 @@ def in_blocks(
     if len(blocks) == 1:
         return blocks[0]
     if not blocks:
-        return empty_state(1, 0).reshaped((0,))
+        return empty_state(1, 0).reshape((0,))
     columns = zip(*(block.arrays() for block in blocks), strict=True)
     return TrajectoryState(*(np.concatenate(parts) for parts in columns))
 
 
-def checked_times(time_s: npt.ArrayLike) -> FloatArray:
+def check_times(time_s: npt.ArrayLike) -> FloatArray:
     """Return times as an array of one axis."""
     times = np.asarray(time_s, dtype=np.float64, order="C")
     if times.ndim != 1:
@@ -106,10 +106,10 @@ def empty_state(rows: int, columns: int) -> TrajectoryState:
     return TrajectoryState(lat, lon, alt, yaw, pitch, roll, np.empty(shape, dtype=bool))
 
 
-def in_rows(rows: Sequence[IntArray], states: Sequence[TrajectoryState]) -> TrajectoryState:
+def assemble_rows(rows: Sequence[IntArray], states: Sequence[TrajectoryState]) -> TrajectoryState:
     """Return states (n,) put together, those of each part in the rows that it has."""
     if not states:
-        return empty_state(1, 0).reshaped((0,))
+        return empty_state(1, 0).reshape((0,))
     order = np.argsort(np.concatenate(rows), kind="stable")
     columns = zip(*(state.arrays() for state in states), strict=True)
     return TrajectoryState(*(np.concatenate(parts)[order] for parts in columns))
@@ -128,9 +128,9 @@ class PieceSearch(Growing):
         #: Index of each aircraft's first and last piece among all.
         self.first, self.last = ends - counts, ends - 1
         self._steps = int(counts.max(initial=1) - 1).bit_length()
-        self._per_s = self._even(counts) if self._steps > _FEW_STEPS else None
+        self._per_s = self._pieces_per_second(counts) if self._steps > _FEW_STEPS else None
 
-    def _even(self, counts: IntArray) -> FloatArray | None:
+    def _pieces_per_second(self, counts: IntArray) -> FloatArray | None:
         """Return how many pieces start in a second of each path; None where they do not evenly."""
         begin, end = self.starts_s[self.first], self.starts_s[self.last]
         if not (begin < end).all():
@@ -141,7 +141,7 @@ class PieceSearch(Growing):
         return per_s if bool((np.abs(apart) < 0.25).all()) else None
 
     @classmethod
-    def of(cls, starts_s: Sequence[FloatArray]) -> PieceSearch:
+    def from_starts(cls, starts_s: Sequence[FloatArray]) -> PieceSearch:
         """Return the search among the pieces of each."""
         counts = np.array([len(starts) for starts in starts_s], dtype=np.int64)
         return cls(np.concatenate([*starts_s, np.empty(0)]), counts)

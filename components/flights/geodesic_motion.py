@@ -57,7 +57,7 @@ def geodesic_parameters(
     cos_beta = each(math.sin, each(math.radians, 90.0 - abs(lat_deg)))
     length = each(math.hypot, sin_beta, cos_beta)
     # At the very pole every meridian starts; a tiny cosine keeps the one that was asked for.
-    sin_beta, cos_beta = sin_beta / length, each(_not_zero, cos_beta / length)
+    sin_beta, cos_beta = sin_beta / length, each(_avoid_zero, cos_beta / length)
     sin_az, cos_az = each(math.sin, azimuth_rad), each(math.cos, azimuth_rad)
     sin_az0 = sin_az * cos_beta
     cos_az0 = each(math.hypot, cos_az, sin_az * sin_beta)
@@ -78,9 +78,9 @@ def geodesic_parameters(
     table[_SPEED_RADIUS] = speed_mps * radius
     table[_CENTRE_DISTANCE] = radius + alt_m
     table[_CLIMB], table[_ALT] = climb_mps, alt_m
-    table[_TAU], table[_PER_METRE] = sigma1 + _added(c1, sines), 1.0 / (semi_minor * a1)
+    table[_TAU], table[_PER_METRE] = sigma1 + _sum_products(c1, sines), 1.0 / (semi_minor * a1)
     table[_SIN_AZ0], table[_COS_AZ0] = sin_az0, cos_az0
-    i3 = sigma1 + _added(c3, sines)
+    i3 = sigma1 + _sum_products(c3, sines)
     table[_LON_RAD] = each(math.radians, lon_deg) - omega1 + lon_slope * i3
     table[_LON_SLOPE], table[_SIGMA], table[_RADIUS] = lon_slope, sigma1, radius
     table[_INVERSE : _INVERSE + _INVERSE_TERMS] = c1_inverse
@@ -96,7 +96,7 @@ def each(function: Callable[..., float], *values: Any) -> Any:
     return np.fromiter(map(function, *columns), dtype=np.float64, count=len(values[0]))
 
 
-def _not_zero(cosine: float) -> float:
+def _avoid_zero(cosine: float) -> float:
     return max(cosine, 1e-100)
 
 
@@ -110,7 +110,7 @@ def power(base: Any, exponent: int) -> Any:
     return each(lambda value: value**exponent, base)
 
 
-def _added(factors: Sequence[Any], sines: Sequence[Any]) -> Any:
+def _sum_products(factors: Sequence[Any], sines: Sequence[Any]) -> Any:
     """Return the sum of products, from the first to the last (`sum` rounds in ways of its own)."""
     total = factors[0] * sines[0]
     for factor, sine in zip(factors[1:], sines[1:], strict=False):
@@ -149,7 +149,7 @@ def geodesic_state(
     sine, cosine, spare = np.sin(tau), np.cos(tau), np.empty_like(tau)
     delta = _sine_series(table, _INVERSE, _INVERSE_TERMS, sine, cosine, spare)
     sigma = np.add(tau, delta, out=tau)
-    _turn_on(sine, cosine, delta, spare)  # now those of sigma
+    _advance_angle(sine, cosine, delta, spare)  # now those of sigma
     along = table[_COS_AZ0] * cosine
     sin_az0 = table[_SIN_AZ0]
     cos_beta = np.multiply(along, along, out=spare)
@@ -171,7 +171,9 @@ def geodesic_state(
     return lat, wrap_longitude_deg(lon), climbed, wrap_heading_rad(yaw)
 
 
-def _turn_on(sine: FloatArray, cosine: FloatArray, delta: FloatArray, spare: FloatArray) -> None:
+def _advance_angle(
+    sine: FloatArray, cosine: FloatArray, delta: FloatArray, spare: FloatArray
+) -> None:
     """Turn a sine and cosine on by a small angle (below 9e-4), in place; overwrites all.
 
     The small angle's own sine and cosine are series to its fifth power; then the addition theorem.

@@ -15,8 +15,8 @@ from components.geometry import (
     TWO_PI,
     local_axes,
     normal_to_degrees,
-    past,
     radii_of_curvature,
+    remainder,
     wrap_heading_rad,
 )
 from dsa_des.arrays.types import FloatArray
@@ -168,13 +168,13 @@ def turn_state(
         -table[_RADIUS] * sine * table[_PER_NORTH],
     )
     rho = np.sqrt(east * east + north * north)
-    lat, lon, to_east, to_north = _on_chart(table, (east, north), (d_east, d_north), rho)
+    lat, lon, to_east, to_north = _offsets_to_angles(table, (east, north), (d_east, d_north), rho)
     direction = np.where(table[_RATE] + 0.0 * rho > 0.0, 1.0, -1.0)
     yaw = wrap_heading_rad(np.arctan2(to_east * direction, to_north * direction))
     return lat, lon, table[_ALT] + table[_CLIMB] * elapsed, yaw
 
 
-def _on_chart(
+def _offsets_to_angles(
     table: FloatArray, offset: Pair, motion: Pair, rho: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return latitude and longitude (deg) of offsets from a place, as angles, and the direction of
@@ -262,7 +262,7 @@ def ramp_state(
     velocity = ramp_velocity(table, elapsed)
     motion = velocity[0] * table[_PER_EAST], velocity[1] * table[_PER_NORTH]
     rho = np.maximum(np.hypot(*offset), _LEAST_ANGLE)
-    lat, lon, to_east, to_north = _on_chart(table, offset, motion, rho)
+    lat, lon, to_east, to_north = _offsets_to_angles(table, offset, motion, rho)
     nose = np.where(np.hypot(*velocity) > _STANDS_MPS, np.arctan2(to_east, to_north), table[_NOSE])
     return lat, lon, table[_LEVEL] + 0.0 * elapsed, wrap_heading_rad(nose)
 
@@ -295,7 +295,7 @@ def hold_state(
     """Evaluate aircraft that stay in one position; see `Segment` for the table's rows."""
     zero = np.zeros_like(elapsed)
     # Reduced before the sum, so that hours of turning keep their digits and stay in [0, 2 pi).
-    yaw = past(table[4] + table[5] * elapsed, TWO_PI)
+    yaw = remainder(table[4] + table[5] * elapsed, TWO_PI)
     return zero + table[0], zero + table[1], table[2] + table[3] * elapsed, yaw
 
 

@@ -55,7 +55,7 @@ class Turn(Leg):
     climb_mps: float | None = Field(default=None, description="Rate of climb, m/s.")
 
     @model_validator(mode="after")
-    def _one_of_each(self) -> Self:
+    def _check_keys(self) -> Self:
         if (self.rate_deg_s is None) == (self.radius_m is None):
             raise ValueError(
                 f"turn rate_deg_s is {self.rate_deg_s} and radius_m is {self.radius_m}: "
@@ -80,7 +80,7 @@ class Climb(Leg):
     speed_mps: float | None = Field(default=None, ge=0, description="New ground speed, m/s.")
 
     @model_validator(mode="after")
-    def _one_end(self) -> Self:
+    def _check_end(self) -> Self:
         if self.duration_s is not None and self.to_alt_m is not None:
             raise ValueError(
                 f"climb duration_s is {self.duration_s} and to_alt_m is {self.to_alt_m}: "
@@ -110,7 +110,7 @@ class Waypoint(Parameters):
     speed_mps: float | None = Field(default=None, gt=0, description="Ground speed to it, m/s.")
 
     @model_validator(mode="after")
-    def _one_place(self) -> Self:
+    def _check_place(self) -> Self:
         geodetic = self.lat_deg is not None and self.lon_deg is not None
         offset = self.east_m is not None and self.north_m is not None
         offsets = (self.east_m, self.north_m, self.up_m)
@@ -182,7 +182,7 @@ class LegBuilder:
             self.speed = leg.speed_mps
         if isinstance(leg, Waypoints):
             for point in leg.points:
-                self._to_waypoint(point)
+                self._add_waypoint(point)
             return 0.0
         climb = self.climb if leg.climb_mps is None else leg.climb_mps
         if isinstance(leg, Turn):
@@ -232,7 +232,7 @@ class LegBuilder:
         bank = math.atan2(self.speed * rate, STANDARD_GRAVITY_M_S2)
         return self._add("turn", table, duration, math.atan2(climb, self.speed), bank)
 
-    def _to_waypoint(self, point: Waypoint) -> None:
+    def _add_waypoint(self, point: Waypoint) -> None:
         if point.speed_mps is not None:
             self.speed = point.speed_mps
         if self.speed <= 0.0:

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from components.flights.fleet import Fleet, LoneFlight, Trajectory, in_rows
+from components.flights.fleet import Fleet, LoneFlight, Trajectory, assemble_rows
 from components.flights.geodesic_motion import geodesic_parameters
 from components.flights.leg_motion import KINDS, ramp_parameters
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.flights.scripted_flights import MOST_ALT_M, ScriptedFleet, ScriptedTrajectory
-from components.flights.steering_plan import SteeredPart, chords, flown_from, times_around_s
+from components.flights.steering_plan import SteeredPart, chords, steered_parts, times_around_s
 from components.geometry import TrajectoryState, heading_from_deg, wrap_longitude_deg
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.growing import Growing
@@ -89,8 +89,9 @@ class SteeredFleet(Growing, Fleet):
     """Ownships, each with its own flight, and after manoeuvres with what each of them led to.
 
     A manoeuvre replaces only its own part: a climb lets a turn in progress go on, and a turn a
-    climb. The flight's own script ends with the first one. A fleet never changes: `steered` returns
-    another one, so that a run can go back, and rows of a message keep those that they know.
+    climb. The flight's own script ends with the first one. A fleet never changes:
+    `add_manoeuvres` gives another one, so that a run can go back, and rows of a message keep those
+    that they know.
     """
 
     def __init__(self, flights: Fleet, parts: Sequence[Parts] = ()) -> None:
@@ -153,22 +154,24 @@ class SteeredFleet(Growing, Fleet):
         """Return the states of ownships (n,), each at a time (n,) of its own, in s, by the first
         `known` of their manoeuvres, or all.
         """
-        own, after, which = self._part_flown(aircraft, time_s, known)
+        own, after, which = self._split_by_manoeuvre(aircraft, time_s, known)
         if not len(after):
-            return self._before(aircraft, time_s)
+            return self._states_before_steering(aircraft, time_s)
         steered = self._parts.each(which, time_s[after])
         if not len(own):
             return steered
-        return in_rows([own, after], [self._before(aircraft[own], time_s[own]), steered])
+        return assemble_rows(
+            [own, after], [self._states_before_steering(aircraft[own], time_s[own]), steered]
+        )
 
-    def _before(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+    def _states_before_steering(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return states before any manoeuvre."""
         if self._alone is None:
             return self._flights.each(aircraft, time_s)
         state: TrajectoryState = self._alone.at(time_s)
         return state
 
-    def _part_flown(
+    def _split_by_manoeuvre(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None
     ) -> tuple[IntArray, IntArray, IntArray]:
         """Return which (n,) are before their first manoeuvre, which after, and in which part."""
@@ -194,14 +197,14 @@ class SteeredFleet(Growing, Fleet):
         """Largest speed of each along its path as it is now, shape (flights,)."""
         every = np.arange(len(self))
         return np.maximum(
-            self._flights.max_speeds_mps, self.fastest_by(every, np.full(len(self), inf))
+            self._flights.max_speeds_mps, self.largest_speed(every, np.full(len(self), inf))
         )
 
     def ground_speeds_mps(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
     ) -> FloatArray:
         """Return the speeds over ground of ownships, asked for as in `each`."""
-        own, after, which = self._part_flown(aircraft, time_s, known)
+        own, after, which = self._split_by_manoeuvre(aircraft, time_s, known)
         speed_mps = np.empty(len(time_s))
         speed_mps[own] = self._flights.ground_speeds_mps(aircraft[own], time_s[own])
         speed_mps[after] = self._parts.ground_speeds_mps(which, time_s[after])
@@ -211,12 +214,12 @@ class SteeredFleet(Growing, Fleet):
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
     ) -> FloatArray:
         """Return fixed angles (3, n) as the flights have them until they are steered."""
-        own, _, _ = self._part_flown(aircraft, time_s, known)
+        own, _, _ = self._split_by_manoeuvre(aircraft, time_s, known)
         fixed_rad = np.full((3, len(time_s)), np.nan)
         fixed_rad[:, own] = self._flights.fixed_attitudes_rad(aircraft[own], time_s[own])
         return fixed_rad
 
-    def fastest_by(self, ownship: IntArray, time_s: FloatArray) -> FloatArray:
+    def largest_speed(self, ownship: IntArray, time_s: FloatArray) -> FloatArray:
         """Return the largest speed of any manoeuvre begun by ownships (n,) by times (n,), or 0."""
         if not len(self._flown):
             return np.zeros(len(ownship))
@@ -226,7 +229,7 @@ class SteeredFleet(Growing, Fleet):
         begun &= np.arange(parts) < self.manoeuvre_count[ownship, np.newaxis]
         return np.asarray(np.where(begun, speeds, 0.0).max(axis=1))
 
-    def steered(
+    def add_manoeuvres(
         self,
         ownship: IntArray,
         time_s: FloatArray,
@@ -247,31 +250,31 @@ class SteeredFleet(Growing, Fleet):
             fleet = self._with_parts(ownship[mine], time_s[mine], new, [None] * len(mine))
             if not len(others):
                 return fleet
-            return fleet.steered(ownship[others], time_s[others], given[others])
-        around = self._around(ownship, time_s)
+            return fleet.add_manoeuvres(ownship[others], time_s[others], given[others])
+        around = self._states_around(ownship, time_s)
         before = [
             self._flown[self._part[own, count - 1]] if count else None
             for own, count in zip(ownship, self.manoeuvre_count[ownship], strict=True)
         ]
         every = [Manoeuvre(*row) for row in given.tolist()]
-        flown = flown_from("ownship", around, time_s, every, before)
+        flown = steered_parts("ownship", around, time_s, every, before)
         return self._with_parts(ownship, time_s, ScriptedFleet(flown), flown)
 
-    def _around(self, ownship: IntArray, time_s: FloatArray) -> TrajectoryState:
+    def _states_around(self, ownship: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return where ownships are around times (n,), as at `times_around_s`, (n, 3)."""
         times_s = times_around_s(time_s)
         around = self.each(np.repeat(ownship, times_s.shape[1]), times_s.reshape(-1))
-        return around.reshaped(times_s.shape)
+        return around.reshape(times_s.shape)
 
     def _ramps(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> ScriptedFleet:
         """Return what ownships fly from their velocities at times (n,) to commanded ones."""
-        _, after, which = self._part_flown(ownship, time_s, None)
+        _, after, which = self._split_by_manoeuvre(ownship, time_s, None)
         velocity = np.full((2, len(time_s)), np.nan)
         velocity[:, after] = self._parts.ramp_velocities_mps(which, time_s[after])
         here = self.each(ownship, time_s)
         rest = np.isnan(velocity[0]).nonzero()[0]
         if len(rest):
-            around = self._around(ownship[rest], time_s[rest])
+            around = self._states_around(ownship[rest], time_s[rest])
             north_m, east_m, base_s = np.array(chords(around, time_s[rest])).T
             velocity[:, rest] = east_m / base_s, north_m / base_s
         east, north, acceleration = (given[:, place] for place in _VELOCITY)
@@ -350,9 +353,11 @@ class SteeredFlight:
         """Return from when to when it is there: from 0 on, as what is flown has no end."""
         return 0.0, inf
 
-    def steered(self, time_s: float, manoeuvre: Manoeuvre) -> SteeredFlight:
-        """Return the flight with a manoeuvre from a time on; see `SteeredFleet.steered`."""
-        fleet = self._fleet.steered(np.array([self._number]), np.array([time_s]), [manoeuvre])
+    def add_manoeuvre(self, time_s: float, manoeuvre: Manoeuvre) -> SteeredFlight:
+        """Return the flight with a manoeuvre from a time on; see `SteeredFleet.add_manoeuvres`."""
+        fleet = self._fleet.add_manoeuvres(
+            np.array([self._number]), np.array([time_s]), [manoeuvre]
+        )
         return SteeredFlight(self.flight, fleet, self._number)
 
     def at(self, time_s: Any) -> TrajectoryState:
@@ -360,7 +365,7 @@ class SteeredFlight:
         times = np.asarray(time_s, dtype=np.float64)
         flat = times.reshape(-1)
         state = self._fleet.each(np.full(len(flat), self._number), flat)
-        return state.reshaped(times.shape)
+        return state.reshape(times.shape)
 
 
 class MixedFleet(Fleet):
@@ -400,7 +405,7 @@ class MixedFleet(Fleet):
         """Return states of flights (n,), each at a time (n,) of its own, in s."""
         parts = self._parts(aircraft)
         states = [fleet.each(index, time_s[row]) for fleet, row, index in parts]
-        return in_rows([row for _, row, _ in parts], states)
+        return assemble_rows([row for _, row, _ in parts], states)
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
         """Return speeds over ground, asked for as in `each`; NaN where no script says them."""
@@ -417,7 +422,7 @@ class MixedFleet(Fleet):
         return fixed_rad
 
 
-def _steered(flights: Sequence[SteeredFlight]) -> SteeredFleet:
+def _join_flights(flights: Sequence[SteeredFlight]) -> SteeredFleet:
     fleet = flights[0]._fleet
     if all(flight._fleet is fleet for flight in flights):
         return fleet.subset(np.array([flight._number for flight in flights]))
@@ -427,7 +432,7 @@ def _steered(flights: Sequence[SteeredFlight]) -> SteeredFleet:
 _FLEETS: dict[type, Callable[[Sequence[Any]], Fleet]] = {
     ScriptedTrajectory: ScriptedFleet,
     SampledTrajectory: SampledFleet,
-    SteeredFlight: _steered,
+    SteeredFlight: _join_flights,
 }
 
 

@@ -73,16 +73,16 @@ def fly_euler(
     h += ḣ; N, E += v (cos ψ, sin ψ); v += a; ψ += ψ̇. The path over the ground is that of the
     airspeed, as in the published tracks.
     """
-    speed = summed(speed_ft_s, acceleration_ft_s2)
-    heading = summed(np.zeros_like(speed_ft_s) + start_heading_rad, turn_rad_s)
+    speed = cumulative_sums(speed_ft_s, acceleration_ft_s2)
+    heading = cumulative_sums(np.zeros_like(speed_ft_s) + start_heading_rad, turn_rad_s)
     zero = np.zeros_like(speed_ft_s)
     with np.errstate(divide="ignore", invalid="ignore"):
         pitch = np.arcsin(np.clip(np.nan_to_num(climb_ft_s / speed), -1.0, 1.0))
     return FlownTracks(
         1.0,
-        summed(zero, speed * np.cos(heading)),
-        summed(zero, speed * np.sin(heading)),
-        summed(altitude_ft, climb_ft_s),
+        cumulative_sums(zero, speed * np.cos(heading)),
+        cumulative_sums(zero, speed * np.sin(heading)),
+        cumulative_sums(altitude_ft, climb_ft_s),
         speed,
         heading,
         climb_ft_s,
@@ -91,7 +91,7 @@ def fly_euler(
     )
 
 
-def summed(start: FloatArray, rates: FloatArray) -> FloatArray:
+def cumulative_sums(start: FloatArray, rates: FloatArray) -> FloatArray:
     """Return start, start + rates[0], start + rates[0] + rates[1], ... along the first axis."""
     total = np.empty_like(rates)
     total[0] = start
@@ -164,7 +164,7 @@ def fly_point_mass(
 DYNAMICS = {"euler": fly_euler, "point_mass": fly_point_mass}
 
 
-def eased_turn(
+def eased_turn_rates(
     left_rad: float,
     left_before_rad: float,
     rate_rad_s: float,

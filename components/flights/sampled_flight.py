@@ -15,9 +15,9 @@ from components.flights.fleet import (
     CELLS_AT_ONCE,
     Fleet,
     PieceSearch,
-    checked_times,
+    check_times,
     empty_state,
-    in_blocks,
+    evaluate_in_blocks,
 )
 from components.flights.sampled_segments import (
     ATTITUDE_ROWS,
@@ -108,7 +108,7 @@ class SampledTrajectory:
                 given["velocity_north_mps"],
                 given["velocity_up_mps"],
             )
-            self.velocity_was_ignored = not _agrees_with_path(velocity, fit_path(*path)[0])
+            self.velocity_was_ignored = not _is_velocity_of_path(velocity, fit_path(*path)[0])
             self.velocity_enu_mps = None if self.velocity_was_ignored else velocity
         #: Which of yaw, pitch and roll were derived from the path, not given.
         self.derived_attitude = tuple(
@@ -162,7 +162,7 @@ class SampledTrajectory:
         )
 
     @classmethod
-    def together(
+    def make_all(
         cls,
         names: Sequence[str],
         time_s: FloatArray,
@@ -185,11 +185,11 @@ class SampledTrajectory:
                 np.ascontiguousarray(part[:, block]) for part in (lat_deg, lon_deg, alt_m)
             )
             at = table, start + first * count
-            flights += cls._alike(names[block], time_s, lat, lon, alt, at)
+            flights += cls._make_all_alike(names[block], time_s, lat, lon, alt, at)
         return flights
 
     @classmethod
-    def _alike(
+    def _make_all_alike(
         cls,
         names: Sequence[str],
         time_s: FloatArray,
@@ -253,7 +253,7 @@ class SampledTrajectory:
             present &= ~self.away[segment] | (elapsed == 0.0)
         table = np.ascontiguousarray(self.coefficients[:, segment])
         state = evaluate_segments(table, elapsed, present)
-        return state.reshaped(times.shape)
+        return state.reshape(times.shape)
 
     def interval_present(self) -> tuple[float, float]:
         """Return the times of the first and the last sample, both included."""
@@ -308,7 +308,7 @@ class SampledFleet(Fleet):
         return table, later if later.any() else None
 
     @cached_property
-    def _away(self) -> BoolArray | None:
+    def _away_segments(self) -> BoolArray | None:
         """In which segments, one after the other, an aircraft is away; None where none ever is."""
         gaps = [flight.away for flight in self._flights]
         if all(one is None for one in gaps):
@@ -326,11 +326,11 @@ class SampledFleet(Fleet):
 
     @cached_property
     def _find(self) -> PieceSearch:
-        return PieceSearch.of([flight.sample_times_s for flight in self._flights])
+        return PieceSearch.from_starts([flight.sample_times_s for flight in self._flights])
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give every aircraft's state at some times."""
-        times, count = checked_times(time_s), len(self)
+        times, count = check_times(time_s), len(self)
         state = empty_state(len(times), count)
         rows = max(1, CELLS_AT_ONCE // max(1, count))
         for first in range(0, len(times), rows) if count else ():
@@ -344,19 +344,19 @@ class SampledFleet(Fleet):
                 index[:, columns] = segment[:, np.newaxis] + self._find.first[columns]
                 elapsed[:, columns] = since[:, np.newaxis]
                 present[:, columns] = there[:, np.newaxis]
-            if self._away is not None:
-                present &= ~self._away[index] | (elapsed == 0.0)
+            if self._away_segments is not None:
+                present &= ~self._away_segments[index] | (elapsed == 0.0)
             aircraft = np.broadcast_to(np.arange(count), shape).reshape(-1)
             table = self._segments(index.reshape(-1), aircraft)
             values = evaluate_segments(table, elapsed.reshape(-1), present.reshape(-1))
-            values = values.reshaped(shape)
+            values = values.reshape(shape)
             for out, value in zip(state.arrays(), values.arrays(), strict=True):
                 out[block] = value
         return state
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
-        return in_blocks(self._state, aircraft, time_s)
+        return evaluate_in_blocks(self._state, aircraft, time_s)
 
     def _segments(self, index: IntArray, aircraft: IntArray) -> FloatArray:
         table, later = self._table
@@ -371,8 +371,8 @@ class SampledFleet(Fleet):
         segment = self._find(aircraft, inside)
         present = (time_s >= start) & (time_s <= end)
         elapsed = inside - samples[segment]
-        if self._away is not None:
-            present &= ~self._away[segment] | (elapsed == 0.0)
+        if self._away_segments is not None:
+            present &= ~self._away_segments[segment] | (elapsed == 0.0)
         return evaluate_segments(self._segments(segment, aircraft), elapsed, present)
 
 
@@ -405,7 +405,7 @@ def _mean_speed_bound(
     return bound
 
 
-def _agrees_with_path(measured: Vector, fitted: Vector) -> bool:
+def _is_velocity_of_path(measured: Vector, fitted: Vector) -> bool:
     """Tell whether velocities are those of the path: median misfit in 5 m/s or 10 % of speed."""
     misfit = np.sqrt(sum((m - f) ** 2 for m, f in zip(measured, fitted, strict=True)))
     speed = np.sqrt(sum(f**2 for f in fitted))

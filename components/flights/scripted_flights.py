@@ -15,9 +15,9 @@ from components.flights.fleet import (
     Fleet,
     FormulaGroup,
     PieceSearch,
-    checked_times,
+    check_times,
     empty_state,
-    in_blocks,
+    evaluate_in_blocks,
 )
 from components.flights.leg_motion import FORMULAS, KINDS, Segment, ramp_velocity
 from components.flights.legs import AnyLeg, LegBuilder, require
@@ -94,7 +94,7 @@ class ScriptedTrajectory:
         segments = builder.build(legs)
         angles = (None if yaw_deg is None else yaw_deg % 360.0, pitch_deg, roll_deg)
         fixed = tuple(None if angle is None else radians(angle) for angle in angles)
-        self._set(name, segments, fixed, float(start_time_s), end)
+        self._set_segments(name, segments, fixed, float(start_time_s), end)
 
     @classmethod
     def from_offset(
@@ -122,12 +122,12 @@ class ScriptedTrajectory:
 
     @classmethod
     def of_segments(cls, *known: Any) -> Self:
-        """Return a flight whose segments are known already; see `_set`."""
+        """Return a flight whose segments are known already; see `_set_segments`."""
         flight = cls.__new__(cls)
-        flight._set(*known)
+        flight._set_segments(*known)
         return flight
 
-    def _set(
+    def _set_segments(
         self,
         name: str,
         segments: list[Segment],
@@ -146,7 +146,7 @@ class ScriptedTrajectory:
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give the aircraft's state at some times."""
         times = np.asarray(time_s, dtype=np.float64)
-        return self.as_fleet.at(times.reshape(-1)).reshaped(times.shape)
+        return self.as_fleet.at(times.reshape(-1)).reshape(times.shape)
 
     @property
     def max_speed_mps(self) -> float:
@@ -166,9 +166,9 @@ class ScriptedFleet(Growing, Fleet):
     """Scripted flights: columns over flights, and over all their legs laid end to end."""
 
     def __init__(self, flights: Sequence[ScriptedTrajectory]) -> None:
-        self._set(*_columns_of(flights))
+        self._set_columns(*_columns_of(flights))
 
-    def _set(
+    def _set_columns(
         self,
         names: Sequence[str],
         between_s: FloatArray,
@@ -200,9 +200,9 @@ class ScriptedFleet(Growing, Fleet):
 
     @classmethod
     def of_columns(cls, *columns: Any) -> ScriptedFleet:
-        """Return flights whose columns are known already; see `_set`."""
+        """Return flights whose columns are known already; see `_set_columns`."""
         fleet = cls.__new__(cls)
-        fleet._set(*columns)
+        fleet._set_columns(*columns)
         return fleet
 
     def with_flights(self, flights: ScriptedFleet) -> ScriptedFleet:
@@ -283,13 +283,13 @@ class ScriptedFleet(Growing, Fleet):
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Give every aircraft's state at some times."""
-        times = checked_times(time_s)
+        times = check_times(time_s)
         groups, others = self._parts
         parts = [(group.columns, group.at(times)) for group in groups]
         if len(others):
             shape = len(times), len(others)
             aircraft = np.broadcast_to(others, shape).reshape(-1)
-            several = self.each(aircraft, np.repeat(times, len(others))).reshaped(shape)
+            several = self.each(aircraft, np.repeat(times, len(others))).reshape(shape)
             parts.append((others, several))
         if len(parts) == 1:
             return parts[0][1]
@@ -301,7 +301,7 @@ class ScriptedFleet(Growing, Fleet):
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
-        return in_blocks(self._state, self._columns[aircraft], time_s)
+        return evaluate_in_blocks(self._state, self._columns[aircraft], time_s)
 
     def _legs_at(self, aircraft: IntArray, time_s: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the leg that each of all flights is on at a time, and since when, s."""
@@ -376,7 +376,7 @@ class ScriptedFleet(Growing, Fleet):
 
 
 def _columns_of(flights: Sequence[ScriptedTrajectory]) -> tuple[Any, ...]:
-    """Return the columns of a fleet; see `ScriptedFleet._set`."""
+    """Return the columns of a fleet; see `ScriptedFleet._set_columns`."""
     segments = [segment for flight in flights for segment in flight.segments]
     kinds = [KINDS.index(s.kind) for s in segments]
     fixed = [[np.nan if a is None else a for a in f.fixed_attitude_rad] for f in flights]

@@ -13,7 +13,7 @@ import numpy as np
 from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.flights.leg_motion import LARGEST_TURN_RADIUS_M, Segment
 from components.flights.legs import Straight, Turn, fly_each
-from components.flights.point_mass import eased_turn
+from components.flights.point_mass import eased_turn_rates
 from components.flights.scripted_flights import MOST_ALT_M, ScriptedTrajectory
 from components.geometry import (
     TrajectoryState,
@@ -52,10 +52,10 @@ class Turning(NamedTuple):
     rate_rad_s: float
     turned_rad: float
 
-    def eased(self, manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
+    def eased_pieces(self, manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
         """Return the rates of an eased turn to a manoeuvre's track, the short way round."""
         left_rad = math.remainder(manoeuvre.heading_rad - self.track_rad, 2.0 * math.pi)
-        rates = eased_turn(
+        rates = eased_turn_rates(
             left_rad,
             left_rad + self.turned_rad,
             self.rate_rad_s,
@@ -77,12 +77,12 @@ class SteeringPlan(NamedTuple):
     speeds: Pieces
     speed_mps: float
 
-    def after(self, elapsed_s: float) -> SteeringPlan:
+    def remaining_after(self, elapsed_s: float) -> SteeringPlan:
         """Return what is left of it after some time."""
         return self._replace(
-            turns=_left(self.turns, elapsed_s),
-            climbs=_left(self.climbs, elapsed_s),
-            speeds=_left(self.speeds, elapsed_s),
+            turns=_remaining_pieces(self.turns, elapsed_s),
+            climbs=_remaining_pieces(self.climbs, elapsed_s),
+            speeds=_remaining_pieces(self.speeds, elapsed_s),
         )
 
     def with_manoeuvre(self, manoeuvre: Manoeuvre, alt_m: float, turning: Turning) -> SteeringPlan:
@@ -90,7 +90,7 @@ class SteeringPlan(NamedTuple):
         plan = self
         speed_now_mps = _mean(self.speeds, 0.0, self.speed_mps)
         if manoeuvre.eases_rad > 0.0:
-            plan = plan._replace(turns=turning.eased(manoeuvre, speed_now_mps))
+            plan = plan._replace(turns=turning.eased_pieces(manoeuvre, speed_now_mps))
         elif manoeuvre.turn_rad != 0.0:
             plan = plan._replace(turns=_turn(manoeuvre, speed_now_mps))
         if manoeuvre.vertical_speed_mps != 0.0:
@@ -127,7 +127,7 @@ class SteeringPlan(NamedTuple):
             speed_mps = max(_mean(plan.speeds, lasts_s, plan.speed_mps), 0.0)
             rate_deg_s = plan.turns[0][1] if plan.turns else 0.0
             legs.append(_leg(lasts_s, speed_mps, climb_mps, rate_deg_s))
-            plan = plan.after(lasts_s)
+            plan = plan.remaining_after(lasts_s)
         return [*legs, _leg(None, plan.speed_mps, plan.climb_mps)]
 
 
@@ -153,7 +153,7 @@ def _turn(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
     angle_rad = math.radians(math.degrees(abs(manoeuvre.turn_rad)))
     rolling: Pieces = ()
     if manoeuvre.roll_rate_rad_s:
-        rolling = _roll_in(angle_rad, rate_rad_s, manoeuvre.roll_rate_rad_s, speed_mps)
+        rolling = _roll_in_pieces(angle_rad, rate_rad_s, manoeuvre.roll_rate_rad_s, speed_mps)
         angle_rad -= math.radians(sum(lasts_s * mean for lasts_s, mean, _ in rolling))
         sign = math.copysign(1.0, manoeuvre.turn_rad)
         rolling = tuple((lasts_s, sign * mean, 0.0) for lasts_s, mean, _ in rolling)
@@ -161,7 +161,9 @@ def _turn(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
     return (*rolling, (rest_s, rate_deg_s, 0.0)) if rest_s > _SHORTEST_PIECE_S else rolling
 
 
-def _roll_in(angle_rad: float, rate_rad_s: float, roll_rad_s: float, speed_mps: float) -> Pieces:
+def _roll_in_pieces(
+    angle_rad: float, rate_rad_s: float, roll_rad_s: float, speed_mps: float
+) -> Pieces:
     """Return how a turn begins whose bank grows at a steady rate, at mean rates in deg/s.
 
     With the bank p t the rate is g tan(p t) / v, and the change of heading after t is
@@ -193,7 +195,7 @@ def _roll_in(angle_rad: float, rate_rad_s: float, roll_rad_s: float, speed_mps: 
     )
 
 
-def _left(pieces: Pieces, elapsed_s: float) -> Pieces:
+def _remaining_pieces(pieces: Pieces, elapsed_s: float) -> Pieces:
     for number, (lasts_s, mean, change) in enumerate(pieces):
         # What rounding leaves of a piece is none.
         if elapsed_s < lasts_s - _SHORTEST_PIECE_S:
@@ -217,7 +219,7 @@ class SteeredPart(ScriptedTrajectory):
     plan: SteeringPlan
 
 
-def flown_from(
+def steered_parts(
     name: str,
     around: TrajectoryState,
     time_s: FloatArray,
@@ -239,7 +241,9 @@ def flown_from(
             north_m, east_m, base_s = ways[row]
             heading_deg = math.degrees(math.atan2(east_m, north_m))
             speed_mps = math.hypot(north_m, east_m) / base_s
-            plan = SteeringPlan((), (), _own_climb((high - low) / base_s, manoeuvre), (), speed_mps)
+            plan = SteeringPlan(
+                (), (), _remaining_climb((high - low) / base_s, manoeuvre), (), speed_mps
+            )
             turned_rad = math.remainder(
                 float(around.yaw_rad[row, 2] - around.yaw_rad[row, 0]), 2.0 * math.pi
             )
@@ -247,17 +251,17 @@ def flown_from(
         else:
             heading_deg = math.degrees(float(around.yaw_rad[row, 1]))
             elapsed_s = at_s - earlier.start_time_s
-            plan = earlier.plan.after(elapsed_s)
+            plan = earlier.plan.remaining_after(elapsed_s)
             turned_rad = math.radians(
-                _turned(earlier.plan.turns, elapsed_s)
-                - _turned(earlier.plan.turns, elapsed_s - 1.0)
+                _turned_angle_deg(earlier.plan.turns, elapsed_s)
+                - _turned_angle_deg(earlier.plan.turns, elapsed_s - 1.0)
             )
             rate_rad_s = math.radians(_mean(plan.turns, 0.0, 0.0))
         turning = Turning(math.radians(heading_deg), rate_rad_s, turned_rad)
         plan = plan.with_manoeuvre(manoeuvre, here, turning)
         starts.append(_Start(name, position, heading_deg, at_s, plan))
     new = [start for start in dict.fromkeys(starts) if start not in _KNOWN]
-    _KNOWN.update(zip(new, _flown_from(new), strict=True))
+    _KNOWN.update(zip(new, _fly_plans(new), strict=True))
     flown = [_KNOWN[start] for start in starts]
     while len(_KNOWN) > _MOST_KNOWN:
         del _KNOWN[next(iter(_KNOWN))]
@@ -276,7 +280,7 @@ def chords(around: TrajectoryState, time_s: FloatArray) -> list[list[float]]:
     return np.stack([*ways, np.ptp(times_around_s(time_s), axis=1)], axis=-1).tolist()
 
 
-def _turned(turns: Pieces, elapsed_s: float) -> float:
+def _turned_angle_deg(turns: Pieces, elapsed_s: float) -> float:
     """Return how far has been turned after some time, deg."""
     turned_deg, left_s = 0.0, elapsed_s
     for lasts_s, rate_deg_s, _ in turns:
@@ -287,7 +291,7 @@ def _turned(turns: Pieces, elapsed_s: float) -> float:
     return turned_deg
 
 
-def _own_climb(climb_mps: float, manoeuvre: Manoeuvre) -> float:
+def _remaining_climb(climb_mps: float, manoeuvre: Manoeuvre) -> float:
     """Return the climb that is left of a flight's own: a turn or a climb ends it."""
     turns = manoeuvre.turn_rad != 0.0 or manoeuvre.eases_rad > 0.0
     ends = turns or manoeuvre.climb_m != 0.0
@@ -310,7 +314,7 @@ _MOST_KNOWN = 4096
 _FEW = 2
 
 
-def _flown_from(starts: Sequence[_Start]) -> list[SteeredPart]:
+def _fly_plans(starts: Sequence[_Start]) -> list[SteeredPart]:
     """Return what is flown from some places on, each as its script would be by itself."""
     legs = [start.plan.legs() for start in starts]
     if len(starts) > _FEW:

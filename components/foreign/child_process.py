@@ -60,7 +60,7 @@ class ChildProcess:
         self.end = finalize(self, _end, self.process, guard, removes)
 
 
-def how_it_ended(code: int) -> str:
+def describe_exit(code: int) -> str:
     """Say how a program ended, by its code as `subprocess` has it."""
     if code < 0:
         return f"died of signal {-code} ({signal.Signals(-code).name})"

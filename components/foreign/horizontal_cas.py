@@ -65,14 +65,14 @@ class HorizontalCas(Component):
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        self._advisory = self._advised(alerts)
+        self._advisory = self._ask_network(alerts)
         rate = math.radians(RATES_DEG_S[self._advisory])
         if rate == 0.0:
             return None
         turn = Manoeuvre(turn_rad=rate * self.p.step_s, rate_rad_s=abs(rate))
         return Manoeuvres.of([int(wake.ticks[0])], [turn])
 
-    def _advised(self, alerts: AlertLevels) -> int:
+    def _ask_network(self, alerts: AlertLevels) -> int:
         there = alerts.relative
         own_east, own_north = (float(alerts.own_motion[n][0]) for n in ("east_mps", "north_mps"))
         course = math.atan2(own_east, own_north)

@@ -236,7 +236,7 @@ class Mavlink(Component):
             datagram = self._udp.receive(left_s)
             if datagram is None:
                 break
-            says = self._link.heard(datagram, self._says)
+            says = self._link.update(datagram, self._says)
             if says is not self._says:
                 self._says, self._last_word_s = says, time.monotonic()
         silent_s = time.monotonic() - self._last_word_s

@@ -83,8 +83,9 @@ class Link:
             level = math.hypot(one.north_mps, one.east_mps)
             made = self._ours.adsb_vehicle_encode(
                 one.number, _degrees(one.lat_deg), _degrees(one.lon_deg),
-                self._dialect.ADSB_ALTITUDE_TYPE_GEOMETRIC, _whole(one.alt_m * _MILLI, 32), course,
-                min(round(level * _CENTI), _MOST_CM_S), _whole(-one.down_mps * _CENTI, 16), name,
+                self._dialect.ADSB_ALTITUDE_TYPE_GEOMETRIC, _clip_to_field(one.alt_m * _MILLI, 32),
+                course, min(round(level * _CENTI), _MOST_CM_S),
+                _clip_to_field(-one.down_mps * _CENTI, 16), name,
                 self._dialect.ADSB_EMITTER_TYPE_NO_INFO, min(round(one.age_s), _MOST_AGE_S),
                 _ADSB_VALID, 0,
             )  # fmt: skip
@@ -93,27 +94,28 @@ class Link:
 
     def own_state(self, time_s: float, own: Flying) -> bytes:
         """Return the HIL_STATE_QUATERNION of the ownship, without rates and accelerations."""
-        speed = _whole(math.hypot(own.north_mps, own.east_mps, own.down_mps) * _CENTI, 16)
+        speed = _clip_to_field(math.hypot(own.north_mps, own.east_mps, own.down_mps) * _CENTI, 16)
         made = self._ours.hil_state_quaternion_encode(
             round(time_s * 1e6), _quaternion(own.yaw_rad, own.pitch_rad, own.roll_rad), 0.0, 0.0,
-            0.0, _degrees(own.lat_deg), _degrees(own.lon_deg), _whole(own.alt_m * _MILLI, 32),
-            _whole(own.north_mps * _CENTI, 16), _whole(own.east_mps * _CENTI, 16),
-            _whole(own.down_mps * _CENTI, 16), speed, speed, 0, 0, 0,
+            0.0, _degrees(own.lat_deg), _degrees(own.lon_deg),
+            _clip_to_field(own.alt_m * _MILLI, 32),
+            _clip_to_field(own.north_mps * _CENTI, 16), _clip_to_field(own.east_mps * _CENTI, 16),
+            _clip_to_field(own.down_mps * _CENTI, 16), speed, speed, 0, 0, 0,
         )  # fmt: skip
         return bytes(made.pack(self._ours))
 
-    def heard(self, datagram: bytes, before: AutopilotSays) -> AutopilotSays:
+    def update(self, datagram: bytes, before: AutopilotSays) -> AutopilotSays:
         """Return what is known after a datagram; garbage and other messages change nothing."""
         says = before
         # A datagram is whole: what a broken one leaves over must not swallow the next.
         theirs = self._dialect.MAVLink(None)
         theirs.robust_parsing = True
         for one in theirs.parse_buffer(datagram) or ():
-            says = _after(one, says)
+            says = _update_says(one, says)
         return says
 
 
-def _after(one: Any, says: AutopilotSays) -> AutopilotSays:
+def _update_says(one: Any, says: AutopilotSays) -> AutopilotSays:
     kind, flying = one.get_type(), says.flying
     if kind == "ATTITUDE":
         turned = flying._replace(yaw_rad=one.yaw, pitch_rad=one.pitch, roll_rad=one.roll)
@@ -131,7 +133,7 @@ def _degrees(angle_deg: float) -> int:
     return round(angle_deg * _E7)
 
 
-def _whole(value: float, bits: int) -> int:
+def _clip_to_field(value: float, bits: int) -> int:
     """Return the nearest whole number that a field of so many bits holds."""
     most = 2 ** (bits - 1) - 1
     return max(-most, min(most, round(value)))

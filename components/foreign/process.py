@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
-from components.foreign.process_answers import answered
+from components.foreign.process_answers import message_of_table
 from components.foreign.process_link import VERSION, ProcessError, ProcessLink, frame
 from components.messages.detections import Detections, SensorOffer
 from components.messages.state_tracks import StateTracks
@@ -30,7 +30,7 @@ from dsa_des.block.component import (
     ScenePath,
     SourcedText,
 )
-from dsa_des.block.message import Message, derived
+from dsa_des.block.message import Message, derive_columns
 from dsa_des.block.wake import Wake
 from dsa_des.time.clock import ClockSpec
 
@@ -196,19 +196,19 @@ class Process(Component):
                 frames += frame(table, batch, {"block": source})
         while True:
             try:
-                return self._asked(frames)
+                return self._exchange(frames)
             except ProcessError:
                 self._is_in.state = None
                 if self.p.on_failure == "stop" or self._is_in.restarts >= self.p.most_restarts:
                     raise
                 self._is_in.restarts += 1
 
-    def _asked(self, frames: list[Any]) -> Any:
+    def _exchange(self, frames: list[Any]) -> Any:
         self.start()
         before = self._first_state if self._state is None else self._state
         wanted = []
         if before is not None and before is not self._is_in.state:
-            wanted = frame(_STATE, _one(state=before), {})
+            wanted = frame(_STATE, _message_fields(state=before), {})
         answer = self._link.ask([*wanted, *frames], self.p.deadline_s)
         after = [table for about, table in answer if about.get("table") == _STATE]
         if type(self).rewindable:
@@ -225,7 +225,7 @@ class Process(Component):
             "arguments": json.dumps(self.p.arguments), "seed": str(self.context.streams.seed),
             "snapshots": str(type(self).rewindable).lower(),
         }  # fmt: skip
-        answer = self._link.ask(frame(_HELLO, _one(), about), self.p.deadline_s)
+        answer = self._link.ask(frame(_HELLO, _message_fields(), about), self.p.deadline_s)
         said = answer[0][0] if answer else {}
         wrong = ""
         if said.get("table") != _HELLO:
@@ -249,7 +249,7 @@ class Process(Component):
 
     def _call_frames(self, tick: int, scan: int) -> list[Any]:
         time_s = tick / self.context.ticks_per_s
-        return frame(_CALL, _one(tick=tick, time_s=time_s, scan=scan), {})
+        return frame(_CALL, _message_fields(tick=tick, time_s=time_s, scan=scan), {})
 
     # -- answers -------------------------------------------------------------------------------
 
@@ -257,7 +257,7 @@ class Process(Component):
         for about, table in answer:
             name = about.get("table", "")
             try:
-                message = answered(
+                message = message_of_table(
                     name, table, tick, self._roster_of(sent), self.name, self.context.ticks_per_s
                 )
             except ValueError as error:
@@ -270,7 +270,7 @@ class Process(Component):
         for _, message in sent:
             if isinstance(found := getattr(message, "roster", None), Roster):
                 self._roster = found
-        return self._roster or Roster.of([])
+        return self._roster or Roster.from_pairs([])
 
     def undone(self) -> dict[str, tuple[int, int]]:
         """Return how often it was asked, where it never had anything to say."""
@@ -303,7 +303,7 @@ class _Current:
     restarts = 0
 
 
-def _one(**values: Any) -> Any:
+def _message_fields(**values: Any) -> Any:
     import pyarrow as pa
 
     if not values:
@@ -315,7 +315,7 @@ def _batches(message: Message) -> Iterator[tuple[str, Any]]:
     """Yield each table of a message, as a run records it."""
     from dsa_des.record.arrow import to_arrow
 
-    declared = derived(type(message)).recorded
+    declared = derive_columns(type(message)).recorded
     for table, columns in message.tables().items():
         kinds = {n: declared[table][n].kind if n in declared[table] else "int64" for n in columns}
         yield table, to_arrow(columns, kinds)

@@ -37,7 +37,7 @@ NEEDED: Mapping[str, tuple[str, ...]] = {
 _TEXTS = ("target", "track_status", "block", "contributors", "updated_by")
 
 
-def answered(
+def message_of_table(
     name: str, table: Any, tick: IntArray, roster: Roster, block: str, ticks_per_s: int
 ) -> Message:
     """Return the message that a table of an answer is.

@@ -14,8 +14,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from components.foreign.child_process import ChildProcess, how_it_ended
-from dsa_des.text.safe_text import printable, shortened
+from components.foreign.child_process import ChildProcess, describe_exit
+from dsa_des.text.safe_text import printable, shorten
 
 VERSION = "1"
 _HEAD = struct.Struct("<Q")
@@ -118,7 +118,7 @@ class ProcessLink:
                 if not ready:
                     raise ProcessError(
                         f"has not answered within deadline_s = {deadline_s:g} s"
-                        f"{' (half a message came)' if reader.begun else ''}"
+                        f"{' (half a message came)' if reader.is_partial else ''}"
                     )
                 for key, _ in ready:
                     if key.fileobj is process.stdin:
@@ -152,7 +152,7 @@ class ProcessLink:
             return
         if not content:
             raise ProcessError(
-                f"{self._how_it_ended()}{' in the middle of a message' if reader.begun else ''}"
+                self._how_it_ended() + (" in the middle of a message" if reader.is_partial else "")
             )
         reader.add(content)
 
@@ -167,7 +167,7 @@ class ProcessLink:
 
     def _how_it_ended(self) -> str:
         with suppress(subprocess.TimeoutExpired):
-            return how_it_ended(self._process.wait(1.0))
+            return describe_exit(self._process.wait(1.0))
         return "closed its output"
 
     def _last_words(self) -> str:
@@ -180,7 +180,7 @@ class ProcessLink:
         said = [line for line in said if line]
         if not said:
             return "; it said nothing on standard error"
-        return "; its last words: " + shortened(printable(" | ".join(said[-5:])), 600)
+        return "; its last words: " + shorten(printable(" | ".join(said[-5:])), 600)
 
 
 class _Frames:
@@ -194,7 +194,7 @@ class _Frames:
         self.done = False
 
     @property
-    def begun(self) -> bool:
+    def is_partial(self) -> bool:
         """Whether something came, and not all."""
         return bool(self._head or self._frames or self._body is not None)
 

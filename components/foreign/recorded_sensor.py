@@ -29,7 +29,7 @@ from dsa_des.block.component import (
     ScenePath,
 )
 from dsa_des.errors import Disagreements, did_you_mean
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 from dsa_des.time.clock import ClockSpec
 
 _FLAGS = ("declared", "cued")
@@ -120,7 +120,7 @@ class RecordedSensor(Component):
         return None if parameters.scan_rate_hz is None else ClockSpec(parameters.scan_rate_hz)
 
     @cached_property
-    def _measured(self) -> Measurements:
+    def _read_measurements(self) -> Measurements:
         measured = read_measurements(
             self.p.file, self.p.block, self.p.place, captured_asterix(self.p.file)
         )
@@ -134,13 +134,15 @@ class RecordedSensor(Component):
 
     def natural_duration_s(self) -> Fraction:
         """Return whole seconds in which the last look has come."""
-        return Fraction(math.floor(self._measured.arrival_s.max()) + 1)
+        return Fraction(math.floor(self._read_measurements.arrival_s.max()) + 1)
 
     def offer(self, port: str) -> SensorOffer:
         """Say what the sensor measures, how well, and how late it comes."""
-        late = self._ticks(self._measured.arrival_s) - self._ticks(self._measured.time_s)
+        late = self._ticks(self._read_measurements.arrival_s) - self._ticks(
+            self._read_measurements.time_s
+        )
         per_s = self.context.ticks_per_s
-        stated = self._stated or self._offer_of_rows()
+        stated = self._sensor_offer or self._offer_of_rows()
         return replace(
             stated,
             clock=None,
@@ -149,7 +151,7 @@ class RecordedSensor(Component):
         )
 
     @cached_property
-    def _stated(self) -> SensorOffer | None:
+    def _sensor_offer(self) -> SensorOffer | None:
         """What the sensor's model says of itself."""
         path, block = self.p.model, self.p.block
         if path is None:
@@ -171,7 +173,7 @@ class RecordedSensor(Component):
         return offer
 
     def _offer_of_rows(self) -> SensorOffer:
-        entries = self._measured.entries
+        entries = self._read_measurements.entries
         same: dict[str, Any] = {}
         for name in _VARIANCES:
             values = entries.get(name, np.empty(0))
@@ -186,11 +188,11 @@ class RecordedSensor(Component):
 
     def _promises(self) -> tuple[tuple[float, float], ...]:
         """Return what looks as far apart as most here promise."""
-        apart_s = np.diff(np.sort(self._measured.time_s))
+        apart_s = np.diff(np.sort(self._read_measurements.time_s))
         return promises_of_looks(float(np.median(apart_s))) if len(apart_s) else ()
 
     def _has(self, name: str) -> bool:
-        values = self._measured.entries.get(name)
+        values = self._read_measurements.entries.get(name)
         return values is not None and not np.isnan(values).all()
 
     def _ticks(self, time_s: FloatArray) -> IntArray:
@@ -198,7 +200,7 @@ class RecordedSensor(Component):
 
     def setup(self) -> None:
         """Name the targets, and date the looks."""
-        measured = self._measured
+        measured = self._read_measurements
         self._tick, self._arrives = self._ticks(measured.time_s), self._ticks(measured.arrival_s)
         if len(near := np.flatnonzero(np.diff(self._tick) == 0)):
             raise ValueError(
@@ -207,10 +209,12 @@ class RecordedSensor(Component):
             )
         names = dict.fromkeys(name for name in measured.target if name is not None)
         rosters = known_targets(self.context)
-        self._roster = rosters[0] if rosters else Roster.of([(n, Aircraft()) for n in names])
+        self._roster = (
+            rosters[0] if rosters else Roster.from_pairs([(n, Aircraft()) for n in names])
+        )
         place = {name: number for number, name in enumerate(self._roster.names)}
         wrong = [
-            f"{where}: target {shortened(str(name))!r} is not in the scene"
+            f"{where}: target {shorten(str(name))!r} is not in the scene"
             f"{did_you_mean(str(name), place)}"
             for name, where in zip(measured.target, measured.where, strict=True)
             if name is not None and name not in place
@@ -236,7 +240,7 @@ class RecordedSensor(Component):
             env.send(self._look(number), leaves=arrives)
 
     def _look(self, number: int) -> Detections:
-        measured = self._measured
+        measured = self._read_measurements
         rows = slice(int(measured.offsets[number]), int(measured.offsets[number + 1]))
         entries = {name: values[rows] for name, values in measured.entries.items()}
         look = {name: values[number : number + 1] for name, values in measured.looks.items()}
@@ -257,7 +261,9 @@ class RecordedSensor(Component):
 
     def warnings(self) -> list[str]:
         """Say what was left out, and how many looks come after the end."""
-        late = int(np.count_nonzero(self._measured.arrival_s >= float(self.context.duration_s)))
+        late = int(
+            np.count_nonzero(self._read_measurements.arrival_s >= float(self.context.duration_s))
+        )
         total = len(self._tick)
-        lines = [f"file: {note}" for note in self._measured.notes]
+        lines = [f"file: {note}" for note in self._read_measurements.notes]
         return lines + ([f"file: {late} of {total} looks come after the end"] if late else [])

@@ -43,7 +43,7 @@ class StandIn:
         time_s, level = own.time_usec / 1e6, math.hypot(own.vx, own.vy)
         if self._course_rad is None:
             self._course_rad = math.atan2(own.vy, own.vx)
-        if time_s >= self._free_from_s and any(_near(own, one) for one in self._others):
+        if time_s >= self._free_from_s and any(_passes_near(own, one) for one in self._others):
             self._course_rad, self._free_from_s = self._course_rad + _TURN_RAD, time_s + _PAUSE_S
         yaw, ms = math.remainder(self._course_rad, 2.0 * math.pi), own.time_usec // 1000
         north, east = round(level * math.cos(yaw)), round(level * math.sin(yaw))
@@ -57,7 +57,7 @@ class StandIn:
         return [bytes(one.pack(self._link)) for one in made]
 
 
-def _near(own: Any, one: Any) -> bool:
+def _passes_near(own: Any, one: Any) -> bool:
     """Return whether an aircraft passes near, if both fly straight on; in a plane."""
     apart_deg = math.remainder(one.lon - own.lon, 3_600_000_000)
     east = apart_deg * _M_PER_E7 * math.cos(math.radians(own.lat / 1e7))

@@ -232,16 +232,16 @@ def _items(record: AsterixRecord) -> dict[str, Any]:
     items = {}
     for item, pattern in _ITEMS[record.category].items():
         with suppress(KeyError):
-            items[item] = _filled(pattern, raw)
+            items[item] = _fill_pattern(pattern, raw)
     return items
 
 
-def _filled(pattern: Any, raw: Mapping[str, Any]) -> Any:
+def _fill_pattern(pattern: Any, raw: Mapping[str, Any]) -> Any:
     """Return a pattern of `_ITEMS` with quantities in it; KeyError where one is not given."""
     if isinstance(pattern, tuple):
-        return tuple(_filled(part, raw) for part in pattern)
+        return tuple(_fill_pattern(part, raw) for part in pattern)
     if isinstance(pattern, dict):
-        return {name: _filled(part, raw) for name, part in pattern.items()}
+        return {name: _fill_pattern(part, raw) for name, part in pattern.items()}
     return raw[pattern] if isinstance(pattern, str) and pattern.startswith("=") else pattern
 
 

@@ -106,9 +106,10 @@ def read_csv(
     knots and feet per minute. Time is a number or ISO 8601 (UTC unless it says otherwise). Latitude
     and longitude may stand in one cell. Rows without a time or a position are left out; heading,
     pitch, roll and velocity are used for aircraft where they have no gaps. One name of several
-    aircraft that no one could be is told apart (`components.formats.recording.told_apart`). With
-    `altitude` the column of that kind is read, else the one whose name comes first. The ownship is
-    the first aircraft unless its id is given; all that is wrong is one `TrafficFileError`.
+    aircraft that no one could be is told apart (`components.formats.recording.rename_duplicates`).
+    With `altitude` the column of that kind is read, else the one whose name comes first. The
+    ownship is the first aircraft unless its id is given; all that is wrong is one
+    `TrafficFileError`.
     """
     problems = Problems(str(path))
     data = read_content(Path(path), problems)
@@ -335,7 +336,7 @@ def _find_columns(
                 taken.append(f"{headers[index]} in {unit}")
             factor = unit_factor(problems, spec, unit, line=line, header=headers[index])
         columns[quantity] = SampleColumn(index, headers[index], factor)
-    problems.raise_if_any()
+    problems.raise_all()
     if taken:
         why = f"as {family} writes it" if family else "no unit is given"
         notes.append(f"{', '.join(taken)}: {why}")

@@ -143,7 +143,7 @@ def _table(
     notes: list[str] = []
     units, body = _find_units(problems, headers, indices, lines[1:], notes)
     columns = {}
-    for quantity in [*_wanted(indices), *(q for q in extra if q in indices)]:
+    for quantity in [*_quantities_to_read(indices), *(q for q in extra if q in indices)]:
         index = indices[quantity]
         line, token = units[quantity]
         if quantity in _OPTIONAL and clean_token(token) not in EXTRA_COLUMNS[quantity].units:
@@ -176,13 +176,13 @@ def _find_columns(
                 f"{hint}",
                 line=line,
             )
-    problems.raise_if_any()
+    problems.raise_all()
     for quantity in ("lat", "lon", "alt") if offsets else ("sx", "sy", "sz"):
         indices.pop(quantity, None)
     return indices
 
 
-def _wanted(indices: dict[str, int]) -> list[str]:
+def _quantities_to_read(indices: dict[str, int]) -> list[str]:
     """List the quantities to read: time, position and one complete velocity."""
     wanted: list[str] = [q for q in ("time", "lat", "lon", "alt", "sx", "sy", "sz") if q in indices]
     return [*wanted, *complete_velocity(indices)]
@@ -239,19 +239,21 @@ def _geodetic(
     here = local_axes(lat, lon)
     if velocity:
         along = [velocity[key] for key in ("ve", "vn", "vu")]
-        velocity = dict(zip(("ve", "vn", "vu"), _turned(along, origin, here), strict=True))
+        velocity = dict(zip(("ve", "vn", "vu"), _rotate_to_axes(along, origin, here), strict=True))
     attitude = {}
     if "yaw" in samples:
         # A heading counts from the reference point's north as well.
         nose = np.radians(samples["yaw"])
-        east, north, _ = _turned([np.sin(nose), np.cos(nose)], origin, here)
+        east, north, _ = _rotate_to_axes([np.sin(nose), np.cos(nose)], origin, here)
         attitude = {"yaw": np.degrees(np.arctan2(east, north))}
     # What the file calls height is an altitude: aircraft at one sz are level, however far apart.
     alt = samples["sz"] + reference[2]
     return {"time": samples["time"], "lat": lat, "lon": lon, "alt": alt, **velocity, **attitude}
 
 
-def _turned(parts: Sequence[FloatArray], origin: Sequence[Vector], axes: Sequence[Vector]) -> Any:
+def _rotate_to_axes(
+    parts: Sequence[FloatArray], origin: Sequence[Vector], axes: Sequence[Vector]
+) -> Any:
     """Return a vector of east, north (and up) at an origin in the axes of other positions."""
     by_axis = zip(*origin[: len(parts)], strict=True)
     xyz = [reduce(add, map(mul, parts, of_all)) for of_all in by_axis]

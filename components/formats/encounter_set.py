@@ -86,12 +86,12 @@ class EncounterSet:
             extra={name: values[indices] for name, values in self.extra.items()},
         )
 
-    def without(self, indices: Sequence[int]) -> "EncounterSet":
+    def drop(self, indices: Sequence[int]) -> "EncounterSet":
         """Return the set without some encounters, which are counted."""
         kept = self.take(np.delete(np.arange(len(self)), indices))
         return replace(kept, skipped=self.skipped + len(indices))
 
-    def together(self, index: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    def common_samples(self, index: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
         """Give for each intruder the times (n,) of both paths' samples at which both are there, and
         north, east and altitude (3, n) of the ownship and of the intruder.
         """
@@ -114,7 +114,7 @@ class EncounterSet:
         if self.kind == TRACKS:
             lists = self._lists(row)
             return lists["time_s"], lists["north_m"], lists["east_m"], lists["altitude_m"]
-        time_s, *position = flown_events([(self, row)], dynamics)
+        time_s, *position = fly_events([(self, row)], dynamics)
         return time_s, *(part[:, 0] for part in position)  # type: ignore[return-value]
 
     def seconds(self, row: int) -> int:
@@ -126,7 +126,7 @@ class EncounterSet:
         return {name: values[entries] for name, values in self.lists.items()}
 
 
-def flown_events(
+def fly_events(
     aircraft: Sequence[tuple[EncounterSet, int]], dynamics: str
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Fly initial states and events of several aircraft, as each would be flown alone.
@@ -144,7 +144,7 @@ def flown_events(
         of, rows = aircraft[columns[0]][0], np.array([aircraft[column][1] for column in columns])
         for name, values in state.items():
             values[columns] = of.state[name][rows]
-        at = of.starts[rows] + _begun(of, rows, len(whole)) - 1
+        at = of.starts[rows] + _count_begun_events(of, rows, len(whole)) - 1
         for k, name in enumerate(LISTS[EVENTS][1:]):
             commands[k][:, columns] = of.lists[name][at]
     climb, turn, acceleration = commands
@@ -179,7 +179,7 @@ def pair_paths(
     alike: dict[tuple[int, int], list[tuple[int, EncounterSet, int, int]]] = {}
     for number, (of, index) in enumerate(encounters):
         if of.kind == TRACKS:
-            for time_s, own, other in of.together(index):
+            for time_s, own, other in of.common_samples(index):
                 paths = PairPaths(time_s, own[:, :, np.newaxis], other[:, :, np.newaxis])
                 yield np.array([number]), paths
             continue
@@ -190,15 +190,15 @@ def pair_paths(
     for pairs in alike.values():
         for start in range(0, len(pairs), _PAIRS_AT_ONCE):
             some = pairs[start : start + _PAIRS_AT_ONCE]
-            one = flown_events([(of, row) for _, of, row, _ in some], dynamics)
-            two = flown_events([(of, row) for _, of, _, row in some], dynamics)
+            one = fly_events([(of, row) for _, of, row, _ in some], dynamics)
+            two = fly_events([(of, row) for _, of, _, row in some], dynamics)
             shorter = min(len(one[0]), len(two[0]))
             own_m, other_m = (np.array(each[1:])[:, :shorter] for each in (one, two))
             paths = PairPaths(one[0][:shorter], own_m, other_m)
             yield np.array([pair[0] for pair in some]), paths
 
 
-def _begun(of: EncounterSet, rows: IntArray, seconds: int) -> IntArray:
+def _count_begun_events(of: EncounterSet, rows: IntArray, seconds: int) -> IntArray:
     """Return how many events of each row have begun by each whole second, (seconds, rows)."""
     lengths = np.diff(of.starts)[rows]
     time_s = of.lists["time_s"][_runs(of.starts[rows], lengths)]

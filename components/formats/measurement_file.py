@@ -15,7 +15,7 @@ import numpy as np
 from components.formats.text_rows import Problems, csv_table, did_you_mean, shown_columns
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.files.input_files import InputFileError, is_folder, read_input_bytes, read_input_text
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 _NEEDED = ("time_s", "azimuth_rad", "elevation_rad")
 _QUARTER, _TURN = math.pi / 2, 2 * math.pi
@@ -103,11 +103,11 @@ def read_measurements(
     if path.suffix == ".ast" or asterix is not None:
         return _of_asterix(path, block, place, asterix)
     if not is_folder(path):
-        table = _read(path, _NEEDED, block)
+        table = _read_table(path, _NEEDED, block)
         _check(table)
         return _looks(table, None)
-    scans = _read(path / "scans.parquet", ("time_s",), block)
-    table = _read(path / "detections.parquet", _NEEDED, block)
+    scans = _read_table(path / "scans.parquet", ("time_s",), block)
+    table = _read_table(path / "detections.parquet", _NEEDED, block)
     _check(scans)
     _check(table)
     return _looks(table, scans)
@@ -165,7 +165,7 @@ def _of_asterix(
     )  # fmt: skip
 
 
-def _read(path: Path, needed: tuple[str, ...], block: str | None) -> _Table:
+def _read_table(path: Path, needed: tuple[str, ...], block: str | None) -> _Table:
     table = _Table(path, Problems(str(path)))
     try:
         names = _of_parquet(table) if path.suffix == ".parquet" else _of_csv(table)
@@ -176,7 +176,7 @@ def _read(path: Path, needed: tuple[str, ...], block: str | None) -> _Table:
             shown = shown_columns(names, not set(names).isdisjoint(LIMITS))
             hint = did_you_mean(name, names)
             table.problems.add(f"there is no column {name!r} among {shown}{hint}")
-    table.problems.raise_if_any()
+    table.problems.raise_all()
     _choose(table, block)
     return table
 
@@ -185,7 +185,7 @@ def _of_csv(table: _Table) -> list[str]:
     def fail(what: str, line: int) -> Exception:
         table.problems.add(what, line=line)
         try:
-            table.problems.raise_if_any()
+            table.problems.raise_all()
         except ValueError as error:
             return error
         raise AssertionError
@@ -214,7 +214,7 @@ def _number(table: _Table, row: int, name: str, cell: str) -> float:
     except (ValueError, KeyError):
         pass
     needed = "a finite number" if name in LIMITS else "true or false"
-    table.add(row, name, f"{shortened(cell, 24)!r}: {needed} is needed, or nothing")
+    table.add(row, name, f"{shorten(cell, 24)!r}: {needed} is needed, or nothing")
     return math.nan
 
 
@@ -254,7 +254,7 @@ def _choose(table: _Table, block: str | None) -> None:
     known = dict.fromkeys(name for name in table.texts["block"] if name is not None)
     if block is None and len(known) > 1:
         table.problems.fail(
-            f"holds detections of {', '.join(shortened(name) for name in known)}: the key block "
+            f"holds detections of {', '.join(shorten(name) for name in known)}: the key block "
             "must name one"
         )
     if block is not None and block not in known and table.path.name != "detections.parquet":
@@ -296,7 +296,7 @@ def _check(table: _Table) -> None:
     if own and len(own) < len(_OWN):
         missing = ", ".join(name for name in _OWN if name not in numbers)
         table.problems.add(f"the ownship's pose lacks {missing}: all six are needed, or none")
-    table.problems.raise_if_any()
+    table.problems.raise_all()
     if len(time_s) == 0 and table.path.name != "detections.parquet":
         table.problems.fail("there are no rows")
 

@@ -238,4 +238,4 @@ def _waypoints(path: Path, at: tuple[float, float], skip_damaged: bool) -> Encou
     encounter_set = set_of_tracks(
         str(path), every, np.ones(len(encounters)).tolist(), encounters, at
     )
-    return encounter_set.without(sorted(damaged)) if damaged else encounter_set
+    return encounter_set.drop(sorted(damaged)) if damaged else encounter_set

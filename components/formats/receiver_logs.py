@@ -42,7 +42,9 @@ def log_of(problems: Problems, data: bytes) -> Log | None:
     first = next(documents, (1, None))
     for marks, said, units, reader in _JSON:
         if isinstance(first[1], dict) and marks <= first[1].keys():
-            reports = _each(problems, chain([first], documents), marks, reader, callsigns)
+            reports = _reports_of_documents(
+                problems, chain([first], documents), marks, reader, callsigns
+            )
             return Log(said, units, reports, callsigns, warnings=warnings)
     return None
 
@@ -111,7 +113,7 @@ def _over_lines(problems: Problems, text: str) -> Iterator[tuple[int, Any]]:
 _Reader = Callable[[Mapping[str, Any], dict[str, str]], Iterator[PositionReport]]
 
 
-def _each(
+def _reports_of_documents(
     problems: Problems,
     documents: Iterator[tuple[int, Any]],
     marks: frozenset[str],
@@ -155,7 +157,7 @@ def _times(value: Any, factor: float) -> Any:
     return value * factor if isinstance(value, int | float) else value
 
 
-def _less(time_s: Any, age_s: Any) -> Any:
+def _subtract_age(time_s: Any, age_s: Any) -> Any:
     return time_s - age_s if isinstance(age_s, int | float) else time_s
 
 
@@ -167,7 +169,7 @@ def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[
             callsigns[name] = str(craft["flight"]).strip()
         climb = craft.get("geom_rate", craft.get("baro_rate", craft.get("vert_rate")))
         yield PositionReport(
-            name, _less(one["now"], craft.get("seen_pos", craft.get("seen"))),
+            name, _subtract_age(one["now"], craft.get("seen_pos", craft.get("seen"))),
             craft.get("lat"), craft.get("lon"), _times(craft.get("alt_geom"), FOOT_M),
             _times(craft.get("alt_baro", craft.get("altitude")), FOOT_M), craft.get("track"),
             _times(craft.get("gs", craft.get("speed")), KNOT_M_S), _times(climb, _FPM),

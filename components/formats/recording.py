@@ -32,7 +32,7 @@ class ReadingNotes:
         self.warnings: list[str] = []
         self._of_aircraft: dict[tuple[str, bool], list[str]] = {}
 
-    def of_one(self, name: str, kind: str, text: str, *, harmless: bool = False) -> None:
+    def note_aircraft(self, name: str, kind: str, text: str, *, harmless: bool = False) -> None:
         """Note what holds of one aircraft; of those of a kind the first is told, and how many."""
         cases = self._of_aircraft.setdefault((kind, harmless), [])
         if f"{name}: {text}" not in cases[-1:]:
@@ -94,14 +94,14 @@ class Recording:
         made = []
         for name in list(self.samples):
             columns = self.samples.pop(name)  # columns of many rows are not held twice
-            columns["time"] = elapsed_times(columns["time"], start)
+            columns["time"] = subtract_start(columns["time"], start)
             made.append(self._flight(name, columns, longest_gap_s))
             if (speed_mps := made[-1].max_speed_mps) > _FASTEST_MPS:
                 self.problems.add(
                     f"{name} flies at up to {speed_mps:.3g} m/s from one sample to the next: at "
                     f"most {_FASTEST_MPS:g} m/s can be meant"
                 )
-        self.problems.raise_if_any()
+        self.problems.raise_all()
         self.notes.settle()
         notes = [*self.notes.harmless, *self.notes.warnings]
         return TrafficFile(
@@ -132,27 +132,27 @@ class Recording:
             velocity_enu_mps=velocity, away=away, **angles,
         )  # fmt: skip
         if trajectory.velocity_was_ignored:
-            self.notes.of_one(
+            self.notes.note_aircraft(
                 name, "velocity",
                 "its velocities do not fit its positions (another unit, or airspeed?) and were "
                 "ignored", harmless=True,
             )  # fmt: skip
         if not len(steps):
             single = "has one sample only and is there at that instant only"
-            self.notes.of_one(name, "single", single, harmless=True)
+            self.notes.note_aircraft(name, "single", single, harmless=True)
         elif steps.max() > min(silent_s, limit_s):
             at = float(columns["time"][int(np.argmax(steps))])
             gaps = int(np.count_nonzero(steps > limit_s))
             then = "positions there are interpolated"
             if gaps:
                 then = "it is not there" + (f", nor in {gaps - 1} more gaps" if gaps > 1 else "")
-            self.notes.of_one(
+            self.notes.note_aircraft(
                 name, "silence", f"no sample for {steps.max():.0f} s after {at:.1f} s; {then}"
             )
         return trajectory
 
 
-def elapsed_times(time_s: FloatArray, start_s: float) -> FloatArray:
+def subtract_start(time_s: FloatArray, start_s: float) -> FloatArray:
     """Subtract the start, and with it the rounding that a large clock reading carries.
 
     325374.3 - 325374.2 is 0.0999999999767 in doubles. The difference is rounded to the digits
@@ -204,7 +204,7 @@ def aircraft_of(time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray) ->
 WithLines = dict[str, tuple[IntArray, Samples]]
 
 
-def told_apart(samples: WithLines, notes: ReadingNotes) -> WithLines:
+def rename_duplicates(samples: WithLines, notes: ReadingNotes) -> WithLines:
     """Return samples with names of their own for aircraft that share one, and note each such name.
 
     The first keeps its name, others are numbered from 2: ``"X (2)"``.
@@ -226,5 +226,5 @@ def told_apart(samples: WithLines, notes: ReadingNotes) -> WithLines:
             result[one] = lines[mine], {key: values[mine] for key, values in columns.items()}
         counts = [f"{one!r} with {np.count_nonzero(of == k)}" for k, one in enumerate(names)]
         said = "aircraft, for none flies so far from one sample to the next"
-        notes.of_one(name, "shared", f"is {len(names)} {said}: {', '.join(counts)} samples")
+        notes.note_aircraft(name, "shared", f"is {len(names)} {said}: {', '.join(counts)} samples")
     return result

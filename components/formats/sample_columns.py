@@ -20,7 +20,7 @@ from components.formats.text_rows import (
     clean_token,
 )
 from dsa_des.arrays.types import FloatArray
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 #: Which altitude is read where there is more than one.
 Altitude = Literal["geometric", "barometric"]
@@ -42,7 +42,7 @@ class ColumnSpec:
 
 
 def indices_of(columns: Mapping[str, ColumnSpec], names: Sequence[str]) -> dict[str, int]:
-    """Return in which column of a file each quantity stands that is there."""
+    """Return the column index of each quantity that a file has."""
     name_of = {q: next((n for n in spec.names if n in names), None) for q, spec in columns.items()}
     return {quantity: names.index(name) for quantity, name in name_of.items() if name is not None}
 
@@ -72,7 +72,7 @@ def unit_factor(
     what = (
         "has no unit"
         if plain in NO_UNIT
-        else f"unit {shortened(token, MOST_OF_A_CELL)!r} is unknown here"
+        else f"unit {shorten(token, MOST_OF_A_CELL)!r} is unknown here"
     )
     problems.add(f"{what}: it must be one of {', '.join(known)}", line=line, column=header)
     return 1.0

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from components.arguments.units import FOOT_M
-from components.formats.recording import ReadingNotes, Recording, told_apart
+from components.formats.recording import ReadingNotes, Recording, rename_duplicates
 from components.formats.sample_columns import SampleColumn, is_missing
 from components.formats.text_rows import MOST_OF_A_CELL, MOST_PROBLEMS, Problems, TrafficFile
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 _LIMITS = {
     "lat": (-90.0, 90.0, "lie in [-90, 90] degrees"),
@@ -58,10 +58,10 @@ class SampleTable:
     without a time or a position: it is left out and counted; an aircraft that has no number at all
     in one column takes those of the column that `instead` names for it; and rows of an aircraft
     that say the same of an instant are one sample, as are a few that do not: the last one counts.
-    With `shared` names several aircraft may have one (`told_apart`). Where a position `repeats`
-    until the next one comes, its height need not be the same. That an aircraft has none of a
-    `seldom` column is not worth a word. `parse_time` reads a time cell where a plain number will
-    not do.
+    With `shared` names several aircraft may have one (`rename_duplicates`). Where a position
+    `repeats` until the next one comes, its height need not be the same. That an aircraft has none
+    of a `seldom` column is not worth a word. `parse_time` reads a time cell where a plain number
+    will not do.
     """
 
     def __init__(
@@ -183,7 +183,7 @@ class SampleTable:
         """Check each aircraft's samples and return them as columns, in the order of time."""
         kept = self._without_gaps()
         if self._shared:
-            kept = told_apart(kept, self.notes)
+            kept = rename_duplicates(kept, self.notes)
         names = list(kept)
         if not names:
             lacking = self._lacking(" or ")
@@ -193,19 +193,19 @@ class SampleTable:
             )
         if len(names) < self._least:
             self._problems.add(
-                f"there is one aircraft only, {shortened(names[0])!r}: an ownship and at least "
+                f"there is one aircraft only, {shorten(names[0])!r}: an ownship and at least "
                 "one intruder are needed"
             )
         own = names[0] if ownship is None else ownship
         if own not in kept:
             self._problems.add(
                 f"there is no aircraft {own!r}: it must be one of "
-                f"{', '.join(shortened(name) for name in names[:MOST_PROBLEMS])}"
+                f"{', '.join(shorten(name) for name in names[:MOST_PROBLEMS])}"
                 f"{', …' if len(names) > MOST_PROBLEMS else ''}"
             )
-        samples = {name: self._sorted(name, *rows) for name, rows in kept.items()}
+        samples = {name: self._sort_by_time(name, *rows) for name, rows in kept.items()}
         self._refuse_long_silence(kept)
-        self._problems.raise_if_any()
+        self._problems.raise_all()
         return {own: samples.pop(own), **samples}
 
     def _without_gaps(self) -> dict[str, tuple[IntArray, dict[str, FloatArray]]]:
@@ -218,7 +218,7 @@ class SampleTable:
             columns = {key: np.asarray(values) for key, values in rows.values.items()}
             rows.values.clear()  # those of many rows are not held beside what is kept of them
             for key, other in self._instead.items():
-                columns[key] = self._one_of_two(name, key, columns[key], columns.pop(other))
+                columns[key] = self._first_or_second(name, key, columns[key], columns.pop(other))
             there = np.ones(len(lines), dtype=bool)
             for key in columns.keys() - self._optional:
                 if (lacks := np.isnan(columns[key])).any():
@@ -237,7 +237,7 @@ class SampleTable:
                         del columns[key]
                         continue
                     filled = _filled(columns["time"], columns[key])
-                    self.notes.of_one(
+                    self.notes.note_aircraft(
                         name, f"gaps in {self._columns[key].header}",
                         f"column {self._columns[key].header} has no number in {missing} of its "
                         f"{len(columns[key])} samples and is ignored" if filled is None else
@@ -265,7 +265,9 @@ class SampleTable:
         kinds = ("time", "position", "height")
         return between.join(f"no {kind}" for kind in kinds if kind in self._lacks)
 
-    def _one_of_two(self, name: str, key: str, first: FloatArray, second: FloatArray) -> FloatArray:
+    def _first_or_second(
+        self, name: str, key: str, first: FloatArray, second: FloatArray
+    ) -> FloatArray:
         """Return an aircraft's first column, or its second where it has nothing in the first."""
         both = ~np.isnan(first) & ~np.isnan(second)
         if both.any():
@@ -305,7 +307,7 @@ class SampleTable:
                 if "_" in cell:
                     raise ValueError(cell)
         except ValueError:
-            shown = shortened(cell, MOST_OF_A_CELL)
+            shown = shorten(cell, MOST_OF_A_CELL)
             hint = "; use a decimal point" if cell.replace(",", ".", 1) != cell else ""
             what = f"{shown!r} is not a number" if cell else "the cell is empty"
             needed = f"a finite number is needed{hint}"
@@ -316,7 +318,7 @@ class SampleTable:
             return None
         if not math.isfinite(value):
             self._problems.add(
-                f"{shortened(cell, MOST_OF_A_CELL)!r} is not finite: a finite number is needed",
+                f"{shorten(cell, MOST_OF_A_CELL)!r} is not finite: a finite number is needed",
                 line=line,
                 column=column.header,
             )
@@ -324,14 +326,14 @@ class SampleTable:
         low, high, allowed = _limits(quantity)
         if not low <= value <= high:
             self._problems.add(
-                f"{shortened(cell, MOST_OF_A_CELL)} is out of range: it must {allowed}",
+                f"{shorten(cell, MOST_OF_A_CELL)} is out of range: it must {allowed}",
                 line=line,
                 column=column.header,
             )
             return None
         return value
 
-    def _sorted(
+    def _sort_by_time(
         self, name: str, lines: IntArray, columns: dict[str, FloatArray]
     ) -> dict[str, FloatArray]:
         """Put an aircraft's samples in the order of time; two places at one time are a problem."""
@@ -340,7 +342,7 @@ class SampleTable:
             return {}
         order = np.argsort(columns["time"], kind="stable")
         if np.any(order[1:] < order[:-1]):
-            self.notes.of_one(
+            self.notes.note_aircraft(
                 name,
                 "order",
                 "rows were not in the order of time and have been sorted",
@@ -354,14 +356,14 @@ class SampleTable:
         if again.any():
             count = int(np.count_nonzero(again))
             said = f"{count} of its samples stand there again and count once"
-            self.notes.of_one(name, "again", said, harmless=self._repeats)
+            self.notes.note_aircraft(name, "again", said, harmless=self._repeats)
             once = np.concatenate([[True], ~again])
             lines, columns = lines[once], {key: values[once] for key, values in columns.items()}
         times, header = columns["time"], self._columns["time"].header
         at_once = np.diff(times) < _SHORTEST_STEP_S
         if self._gaps and 0 < (count := int(np.count_nonzero(at_once))) <= len(times) // _ONE_IN:
             said = f"several samples at one instant, {count} times: the last one counts"
-            self.notes.of_one(name, "at once", said)
+            self.notes.note_aircraft(name, "at once", said)
             last = np.append(~at_once, True)
             return {key: values[last] for key, values in columns.items()}
         for i in np.flatnonzero(at_once):

@@ -24,7 +24,7 @@ from components.formats.encounter_set import (
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.errors import OutputError, did_you_mean, shown_value
 from dsa_des.files.input_files import InputFileError, read_once, status_of
-from dsa_des.files.output_file import streamed
+from dsa_des.files.output_file import stream_file
 from dsa_des.files.output_names import reason_of
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ class _SetReader:
             str(self.path), self.kind, rows_of, weights[first], bounds, tuple(map(str, names)),
             flat, starts, lists, reference, extra,
         )  # fmt: skip
-        return result.without(sorted(said)) if said else result
+        return result.drop(sorted(said)) if said else result
 
     def column(self, name: str) -> FloatArray:
         column = self.table[name]
@@ -269,7 +269,7 @@ def write_set(path: Path, about: dict[str, Any], parts: Iterable[EncounterSet]) 
     import pyarrow.parquet as pq
 
     try:
-        with streamed(path) as file, ExitStack() as stack:
+        with stream_file(path) as file, ExitStack() as stack:
             writer: Any = None
             for part in parts:
                 table = _table_of(part)

@@ -22,7 +22,7 @@ from dsa_des.files.input_files import (
     is_folder,
     read_input_bytes,
 )
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 LENGTH_M = {
     "m": 1.0,
@@ -116,9 +116,9 @@ class TrafficFileError(ValueError):
 
     def __str__(self) -> str:
         if len(self.problems) == 1:
-            return Lines.of([f"{self.path}: {self.problems[0]}"])
+            return Lines.from_lines([f"{self.path}: {self.problems[0]}"])
         lines = [f"{self.path}: {len(self.problems)} problems"]
-        return Lines.of(lines + [f"  {problem}" for problem in self.problems])
+        return Lines.from_lines(lines + [f"  {problem}" for problem in self.problems])
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ class Problems:
         else:
             self._more += 1
 
-    def raise_if_any(self) -> None:
+    def raise_all(self) -> None:
         """Raise one `TrafficFileError` with all problems so far, in order of their lines."""
         if not self._lines:
             return
@@ -182,7 +182,7 @@ class Problems:
     def fail(self, problem: str, *, line: int | None = None, column: str | None = None) -> NoReturn:
         """Note a problem that makes reading on pointless, and raise."""
         self.add(problem, line=line, column=column)
-        self.raise_if_any()
+        self.raise_all()
         raise AssertionError
 
 
@@ -191,7 +191,7 @@ def shown_columns(headers: Iterable[str], known: bool) -> str:
 
     A file without any of our columns is something else, whose content is not quoted.
     """
-    names = [shortened(header, MOST_OF_A_CELL) for header in headers]
+    names = [shorten(header, MOST_OF_A_CELL) for header in headers]
     if not known:
         return f"the {len(names)} columns of the first row"
     return ", ".join(names[:MOST_COLUMNS]) + (", …" if len(names) > MOST_COLUMNS else "")
@@ -262,7 +262,7 @@ def lines_of(
 
 def text_of(data: bytes, problems: Problems, needed: str = _TRAFFIC) -> str:
     """Return text in UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1."""
-    text = _decoded(data)
+    text = _decode(data)
     if text is None:
         problems.fail(f"this is a binary file: {needed} is needed")
     return text
@@ -283,7 +283,7 @@ def each_line(text: str) -> Iterator[tuple[int, str]]:
             yield number, line.strip(" ")
 
 
-def _decoded(data: bytes) -> str | None:
+def _decode(data: bytes) -> str | None:
     """Decode text, or return None for something that is none."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         encodings = ["utf-16"]

@@ -103,14 +103,14 @@ def read_track_csv(path: Path, at: tuple[float, float] | None = None) -> Tracks:
     if not rows_of:
         raise _wrong(path, "a row of column names and rows of samples are needed")
     notes: list[str] = []
-    tracks = [_in_order(path, n, np.array(rows).T, notes) for n, rows in rows_of.items()]
+    tracks = [_sort_by_time(path, n, np.array(rows).T, notes) for n, rows in rows_of.items()]
     if wanted is _PLANE:
         return [_feet(t, x, y, z) for t, x, y, z in tracks], None, notes
     origin = at or (float(tracks[0][1, 0]), float(tracks[0][2, 0]))
-    return [_in_plane(samples, origin) for samples in tracks], origin, notes
+    return [_project_to_plane(samples, origin) for samples in tracks], origin, notes
 
 
-def _in_plane(samples: FloatArray, origin: tuple[float, float]) -> Track:
+def _project_to_plane(samples: FloatArray, origin: tuple[float, float]) -> Track:
     """Return a track of latitudes and longitudes in the plane that touches at the origin."""
     time_s, lat, lon, alt_ft = samples
     north, east, _ = line_of_sight_ned(*origin, 0.0, lat, lon, np.zeros_like(lat))
@@ -209,11 +209,11 @@ def read_track_matrices(path: Path) -> Tracks:
             raise EncounterSetError(f"{path}: aircraft {k + 1}: holds something else than numbers")
         if matrix[0, 0] < 0.0:
             raise EncounterSetError(f"{path}: aircraft {k + 1}: time is negative")
-        tracks.append(_feet(*_in_order(path, f"aircraft {k + 1}", matrix[:4], notes)))
+        tracks.append(_feet(*_sort_by_time(path, f"aircraft {k + 1}", matrix[:4], notes)))
     return tracks, None, notes
 
 
-def _in_order(path: Path, name: str, samples: FloatArray, notes: list[str]) -> FloatArray:
+def _sort_by_time(path: Path, name: str, samples: FloatArray, notes: list[str]) -> FloatArray:
     """Return samples (columns, n), the time first, by time; those that stand there again once."""
     name = name or "the track"
     order = np.argsort(samples[0], kind="stable")
@@ -265,6 +265,6 @@ def read_paired_text(path: Path) -> Tracks:
     tracks: list[Track] = []
     for name, samples in rows_of.items():
         columns = np.array(samples).T * np.array(factors)[:, np.newaxis]
-        time_s, east, north, up = _in_order(path, name, columns, notes)
+        time_s, east, north, up = _sort_by_time(path, name, columns, notes)
         tracks.append((time_s, north, east, up))
     return tracks, None, notes

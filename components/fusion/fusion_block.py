@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from components.fusion.recent import Recent, whole_and_alone
+from components.fusion.recent import Recent, split_used_rows
 from components.messages.columns import OWN_VELOCITY, POSE, TOLD
 from components.messages.contributors import mask_type
 from components.messages.detections import Detections, SensorOffer
@@ -101,7 +101,7 @@ class Fusion(Component):
         return {
             one.block: replace(
                 one.offer,
-                latest_s=how_late_s(one) + waits_s,
+                latest_s=largest_delay_s(one) + waits_s,
                 jitter_s=one.jitter_s + one.offer.jitter_s + waits_s,
                 unforeseen=one.unforeseen or one.offer.unforeseen,
                 platform=one.platform,
@@ -151,10 +151,10 @@ class Fusion(Component):
         entries : dict of (fused,) of int
             By sensor, which entry of its message belongs to each fused detection; -1 for none.
         """
-        fused, parts = self._made(instants, row, target, arrivals, entries)
+        fused, parts = self._fused_message(instants, row, target, arrivals, entries)
         if len(self.sensors) > 1:
             of_two = has_two(fused.contributors)
-            self._tries = self._tries.with_more(instants.run[row], fused.contributors, of_two)
+            self._tries = self._tries.add_tries(instants.run[row], fused.contributors, of_two)
         if self._says_what_is_new:
             fused.measurements = self._new(fused, parts, instants, arrivals, entries)
         return fused
@@ -172,9 +172,9 @@ class Fusion(Component):
         targets = np.concatenate([one.message.target for one in arrivals.values()])
         used = self._recent.used_of(arrivals)
         row = fused.row_of_entries
-        whole, at, alone = whole_and_alone(row, parts, made, used)
+        whole, at, alone = split_used_rows(row, parts, made, used)
         used[parts[parts >= 0]] = True
-        self._recent = self._recent.with_used(arrivals, used)
+        self._recent = self._recent.mark_used(arrivals, used)
         row = np.concatenate([row[whole], at])
         order = np.argsort(row, kind="stable")
         target = np.concatenate([fused.target[whole], targets[alone]])[order]
@@ -184,9 +184,9 @@ class Fusion(Component):
             by_itself = np.where((alone >= start) & (alone < start + count), alone - start, -1)
             mine[name] = np.concatenate([entries[name][whole], by_itself])[order]
             start += count
-        return self._made(instants, row[order], target, arrivals, mine)[0]
+        return self._fused_message(instants, row[order], target, arrivals, mine)[0]
 
-    def _made(
+    def _fused_message(
         self,
         instants: RunTicks,
         row: IntArray,
@@ -205,16 +205,16 @@ class Fusion(Component):
         angle_source, of_angles = every.best(self.by_angles)
         range_source, of_range = every.best(self.by_range)
         parts = [of_angles, of_range]
-        values = {name: every.taken(attrgetter(name), of_angles) for name in _ANGLES}
-        values |= {name: every.taken(attrgetter(name), of_range) for name in _RANGES}
-        pose = every.taken(poses, of_angles) if self._with_pose else None
-        told = every.taken(told_columns, of_range) if self._told else None
+        values = {name: every.values_at(attrgetter(name), of_angles) for name in _ANGLES}
+        values |= {name: every.values_at(attrgetter(name), of_range) for name in _RANGES}
+        pose = every.values_at(poses, of_angles) if self._with_pose else None
+        told = every.values_at(reported_error_columns, of_range) if self._told else None
         moves = None
         if self.by_range_rate:
             _, of_rate = every.best(self.by_range_rate)
             parts.append(of_rate)
-            values |= {name: every.taken(attrgetter(name), of_rate) for name in _RATES}
-            moves = every.taken(velocities, of_rate) if self._with_pose else None
+            values |= {name: every.values_at(attrgetter(name), of_rate) for name in _RATES}
+            moves = every.values_at(velocities, of_rate) if self._with_pose else None
         message = FusedWithPose if self._navigation_errs else FusedDetections
         fused = message(
             tick=instants.tick,
@@ -226,7 +226,7 @@ class Fusion(Component):
             range_source=range_source,
             roster=next(iter(arrivals.values())).message.roster,
             sensors=self.sensors,
-            measured_tick=every.taken(Detections.measured_ticks, of_angles),
+            measured_tick=every.values_at(Detections.measured_ticks, of_angles),
             ticks_per_s=self.context.ticks_per_s,
             own_of_entries=None if pose is None else dict(zip(POSE, pose, strict=True)),
             own_velocity=None if moves is None else dict(zip(OWN_VELOCITY, moves, strict=True)),
@@ -238,7 +238,7 @@ class Fusion(Component):
         return fused, np.stack([every_row if of is None else of for of in parts])
 
 
-def how_late_s(sensor: Producer) -> Fraction:
+def largest_delay_s(sensor: Producer) -> Fraction:
     """Return how late a sensor's looks come at most: by its own saying, and on the wire."""
     own_s = sensor.offer.latest_s if isinstance(sensor.offer, SensorOffer) else None
     return sensor.latest_s + (own_s or Fraction(0))
@@ -260,8 +260,8 @@ def velocities(message: Detections) -> FloatArray:
     return np.stack(list(velocity.values()))
 
 
-def told_columns(message: Detections) -> FloatArray:
-    """Return what each entry is told, (`TOLD`, entries); NaN for nothing."""
+def reported_error_columns(message: Detections) -> FloatArray:
+    """Return the reported error columns of each entry, (`TOLD`, entries); NaN where none."""
     if message.told_by_target is None:
         return np.full((len(TOLD), len(message.target)), np.nan)
     return np.stack([message.told_by_target[name] for name in TOLD])
@@ -302,7 +302,7 @@ class _Entries:
             sensor[rows], entry[rows] = index, those
         return sensor, entry
 
-    def taken(self, of: Callable[[Detections], AnyArray], entry: IntArray | None) -> Any:
+    def values_at(self, of: Callable[[Detections], AnyArray], entry: IntArray | None) -> Any:
         """Return what rows take of a message's entries, (..., rows); NaN or 0 for none."""
         if entry is None:
             return of(self._messages[0])
@@ -340,7 +340,7 @@ def latest_in_gate(
     return np.where(fits, entry, -1)
 
 
-def each_alone(
+def single_entry_rows(
     taken: Mapping[str, tuple[IntArray, IntArray]], sensors: Iterable[str]
 ) -> tuple[IntArray, dict[str, IntArray]]:
     """Return rows, and for `Fusion.combine` entries, of fused detections of one entry each.

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from components.fusion.fusion_block import Fusion, how_late_s, poses
+from components.fusion.fusion_block import Fusion, largest_delay_s, poses
 from components.fusion.ladder import FUSION_LADDER
 from components.geometry import (
     angle_by_haversine,
@@ -35,7 +35,7 @@ class Entries(NamedTuple):
     pose: FloatArray  # (6, entries), believed by the ownship; NaN where not stated
 
     @classmethod
-    def of(cls, arrivals: Arrivals) -> "Entries":
+    def from_arrivals(cls, arrivals: Arrivals) -> "Entries":
         """Return those of a sensor's reports."""
         message, row = arrivals.message, arrivals.message.row_of_entries
         made = message.measured_ticks()
@@ -52,7 +52,7 @@ class Gates(NamedTuple):
     ticks_per_s: int
 
 
-def carried(
+def extrapolate_entries(
     one: Entries, mine: IntArray, other: Entries, theirs: IntArray, ticks_per_s: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return azimuth, elevation and range of entries `theirs` at the instants of `mine`.
@@ -111,7 +111,9 @@ def nearest_in_gate(one: Entries, anchors: IntArray, other: Entries, gates: Gate
     known = (waited >= 0) & (waited <= gates.came_ticks)
     which, candidate = which[known], candidate[known]
     mine = anchors[which]
-    azimuth, elevation, range_m = carried(one, mine, other, candidate, gates.ticks_per_s)
+    azimuth, elevation, range_m = extrapolate_entries(
+        one, mine, other, candidate, gates.ticks_per_s
+    )
     apart_rad = angle_by_haversine(
         one.message.azimuth_rad[mine], one.message.elevation_rad[mine], azimuth, elevation
     )
@@ -168,7 +170,9 @@ class Gated(Fusion):
     def setup(self) -> None:
         """Rank the sensors, and learn how late their detections may come."""
         super().setup()
-        latest_s = max((how_late_s(producer) for producer in self.context.producers), default=0)
+        latest_s = max(
+            (largest_delay_s(producer) for producer in self.context.producers), default=0
+        )
         self.keep_ticks = self.gate_ticks + math.ceil(latest_s * self.context.ticks_per_s)
 
     def run(self, wake: Wake) -> FusedDetections | None:
@@ -180,7 +184,7 @@ class Gated(Fusion):
         arrivals = self.with_recent(reported, wake)
         best_first = [self.sensors[index] for index in reversed(self.by_angles)]
         order = [name for name in best_first if name in arrivals]
-        seen = {name: Entries.of(arrivals[name]) for name in order}
+        seen = {name: Entries.from_arrivals(arrivals[name]) for name in order}
         gates = Gates(
             self.gate_ticks, self.keep_ticks, float(np.radians(self.p.angle_gate_deg)),
             self.p.range_gate_m, self.context.ticks_per_s,
@@ -206,13 +210,13 @@ class Gated(Fusion):
                 same = seen[other].came[entry[together]] == one.came[mine[together]]
                 free[other][entry[together][same]] = False
                 gathered[other].append(entry)
-        in_order = self._in_order(rows, anchors, arrivals)
+        in_order = self._sort_order(rows, anchors, arrivals)
         row = np.concatenate(rows)[in_order]
         entries = {name: np.concatenate(parts)[in_order] for name, parts in gathered.items()}
         target = self._targets(entries, arrivals, order)
         return self.combine(wake.instants, row, target, arrivals, entries)
 
-    def _in_order(
+    def _sort_order(
         self,
         rows: list[IntArray],
         anchors: list[tuple[str, IntArray]],

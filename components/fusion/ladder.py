@@ -40,7 +40,7 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
     return {name: values[row, target] for name, values in measure(block, wake, block).items()}
 
 
-def _to_the_truth(values: AnyArray, reference: AnyArray) -> FloatArray:
+def _errors_to_truth(values: AnyArray, reference: AnyArray) -> FloatArray:
     return values
 
 
@@ -56,8 +56,8 @@ FUSION_LADDER = Ladder(
     ),
     "exact_instant",
     (
-        Quantity("range", "m", _to_the_truth),
-        Quantity("direction", "mrad", _to_the_truth),
+        Quantity("range", "m", _errors_to_truth),
+        Quantity("direction", "mrad", _errors_to_truth),
     ),
     measure,
     truth,

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from components.fusion.fusion_block import Fusion, each_alone
+from components.fusion.fusion_block import Fusion, single_entry_rows
 from components.messages.columns import POSE
 from components.messages.fused import FusedDetections
 from components.messages.looks import Looks
@@ -39,7 +39,7 @@ class PassThrough(Fusion):
             row = last_of_run(wake.instants, new.instants)
             row = np.repeat(row, np.diff(new.message.offsets))
             alone[name] = row, np.arange(len(row))
-        row, entries = each_alone(alone, arrivals)
+        row, entries = single_entry_rows(alone, arrivals)
         order = np.argsort(row, kind="stable")
         target = np.concatenate([new.message.target for new in arrivals.values()])[order]
         entries = {name: entry[order] for name, entry in entries.items()}

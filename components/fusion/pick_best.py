@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.fusion.fusion_block import Fusion, each_alone, latest_in_gate
+from components.fusion.fusion_block import Fusion, latest_in_gate, single_entry_rows
 from components.fusion.ladder import FUSION_LADDER
 from components.messages.detections import SensorOffer
 from components.messages.false_detections import FALSE_TARGET
@@ -59,7 +59,7 @@ class PickBest(Fusion):
         clocks = [clock for one in self.context.producers if (clock := _reports(one)) is not None]
         if len(clocks) < 2 or len(clocks) < len(self.context.producers):
             return super().warnings()
-        apart_s = min(least_apart_s(*pair) for pair in combinations(clocks, 2))
+        apart_s = min(closest_clock_distance_s(*pair) for pair in combinations(clocks, 2))
         if apart_s <= self.p.coincidence_s:
             return super().warnings()
         return [
@@ -92,7 +92,7 @@ class PickBest(Fusion):
             for entry, at, of in zip(entries.values(), positions, true, strict=True):
                 entry[at] = np.arange(len(at)) if of is None else of
         if any(of is not None for of in true):
-            rows, alone = each_alone(self._false_alarms(arrivals, wake), arrivals)
+            rows, alone = single_entry_rows(self._false_alarms(arrivals, wake), arrivals)
             order = np.argsort(np.concatenate([row, rows]), kind="stable")
             row = np.concatenate([row, rows])[order]
             target = np.append(target, np.full(len(rows), FALSE_TARGET))[order]
@@ -125,8 +125,10 @@ def _reports(sensor: Producer) -> tuple[Fraction, Fraction] | None:
     return clock.offset_s + sensor.latest_s, clock.period_s
 
 
-def least_apart_s(one: tuple[Fraction, Fraction], other: tuple[Fraction, Fraction]) -> Fraction:
-    """Return how near two clocks come to each other, each its first instant and its period, s."""
+def closest_clock_distance_s(
+    one: tuple[Fraction, Fraction], other: tuple[Fraction, Fraction]
+) -> Fraction:
+    """Return the least time between ticks of two clocks, each (first instant, period), s."""
     (first_s, period_s), (second_s, other_s) = one, other
     # Differences of their instants are all those of the offsets and multiples of this.
     step_s = Fraction(

@@ -38,7 +38,7 @@ class Recent:
                 parts.append(_rows(old, self.used[name][self.kept[name]], going))
             if (new := arrivals.get(name)) is not None:
                 parts.append((new, np.zeros(len(new.message.target), dtype=bool)))
-            together[name], used[name] = _joined(parts)
+            together[name], used[name] = _concatenate_by_run(parts)
         latest = max(int(new.tick.max()) for new in arrivals.values())
         seen, kept = {}, {}
         for name, all_seen in together.items():
@@ -61,7 +61,7 @@ class Recent:
             ]
         )
 
-    def with_used(self, arrivals: Mapping[str, Arrivals], used: BoolArray) -> Self:
+    def mark_used(self, arrivals: Mapping[str, Arrivals], used: BoolArray) -> Self:
         """Return what is recent once more entries are used; both are as for `used_of`."""
         ends = np.cumsum([len(one.message.target) for one in arrivals.values()])
         parts = dict(zip(arrivals, np.split(used, ends[:-1]), strict=True))
@@ -74,14 +74,14 @@ def _rows(seen: Arrivals, used: BoolArray, rows: slice | IntArray) -> tuple[Arri
     return Arrivals(seen.source, seen.instants.take(rows), seen.message.take(rows)), used[which]
 
 
-def _joined(parts: list[tuple[Arrivals, BoolArray]]) -> tuple[Arrivals, BoolArray]:
+def _concatenate_by_run(parts: list[tuple[Arrivals, BoolArray]]) -> tuple[Arrivals, BoolArray]:
     """Return the rows of one sensor, those of each run together."""
     (first, used), *more = parts
     if not more:
         return first, used
     whole = Arrivals(
         first.source,
-        RunTicks.joined([one.instants for one, _ in parts]),
+        RunTicks.concatenate([one.instants for one, _ in parts]),
         Detections.concatenate([one.message for one, _ in parts]),
     )
     used = np.concatenate([flags for _, flags in parts])
@@ -89,7 +89,7 @@ def _joined(parts: list[tuple[Arrivals, BoolArray]]) -> tuple[Arrivals, BoolArra
     return (whole, used) if order is None else _rows(whole, used, order)
 
 
-def whole_and_alone(
+def split_used_rows(
     row: IntArray, parts: IntArray, made: IntArray, used: BoolArray
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Return what of fused rows is new: rows as they are, and detections by themselves.

@@ -15,8 +15,8 @@ from components.geometry.angles import (
     longitude_difference_deg,
     longitude_difference_rounded,
     normal_to_degrees,
-    past,
     positive_turn,
+    remainder,
     sine_and_cosine,
     slope_angle,
     wrap_by_sines,
@@ -74,12 +74,12 @@ from components.geometry.field_of_view import FieldOfView, rising_sector, sector
 from components.geometry.meridians import (
     NEAR_A_POLE_DEG,
     level_parts,
+    rotate_to_meridian,
     turn_of_north_rad,
-    turned_by_meridians,
 )
 from components.geometry.sensor_axes import (
+    rotate_variances,
     sensor_angles,
     sensor_angles_of_offsets,
-    turned_variances,
 )
 from components.geometry.state import POSE_FIELDS, POSITION_FIELDS, TrajectoryState

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import common_shape, shaped, squarable
+from components.arguments.checks import broadcast_results, common_shape, squarable
 from dsa_des.arrays.column_values import one_row
 from dsa_des.arrays.types import FloatArray
 
@@ -71,7 +71,7 @@ def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
         many turns lose nothing beyond what the input itself had lost.
     """
     angle = squarable("angle_rad", angle_rad)
-    (wrapped,) = shaped(angle.shape, wrap_pi_unchecked(np.atleast_1d(angle)))
+    (wrapped,) = broadcast_results(angle.shape, wrap_pi_unchecked(np.atleast_1d(angle)))
     return wrapped
 
 
@@ -111,7 +111,7 @@ def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
     flat = np.atleast_1d(angle)
     inside = (flat >= 0.0) & (flat < TWO_PI)
     wrapped = np.where(inside, flat, positive_turn(wrap_pi_unchecked(flat))) + 0.0
-    (wrapped,) = shaped(angle.shape, wrapped)
+    (wrapped,) = broadcast_results(angle.shape, wrapped)
     return wrapped
 
 
@@ -154,7 +154,7 @@ def wrap_heading_rad(angle: FloatArray) -> FloatArray:
     return np.where((wrapped >= TWO_PI) | (wrapped < 0.0), 0.0, wrapped)
 
 
-def past(angle: FloatArray, turn: float) -> FloatArray:
+def remainder(angle: FloatArray, turn: float) -> FloatArray:
     """Give the remainder of angles by a turn, in [0, turn)."""
     rest = np.mod(angle, turn)
     return np.where(rest >= turn, 0.0, rest)
@@ -259,7 +259,7 @@ def longitude_difference_deg(
     lon1, lon2 = squarable("lon1_deg", lon1_deg), squarable("lon2_deg", lon2_deg)
     shape = common_shape(lon1_deg=lon1, lon2_deg=lon2)
     difference, error = _longitude_difference(np.atleast_1d(lon1), np.atleast_1d(lon2))
-    difference, error = shaped(shape, difference, error)
+    difference, error = broadcast_results(shape, difference, error)
     return difference, error
 
 
@@ -272,19 +272,19 @@ def longitude_difference_rounded(lon1: FloatArray, lon2: FloatArray) -> FloatArr
         return total
     # The two-sum is exact for any size; only whole turns of an absurd total are not.
     if largest > _LARGE_LONGITUDE_DEG:
-        total, low = _two_difference(_reduced(lon1), _reduced(lon2))
-    return _add_wrapped(total, low)[0]
+        total, low = _two_difference(_reduce_longitude(lon1), _reduce_longitude(lon2))
+    return _wrap_sum(total, low)[0]
 
 
 def _longitude_difference(lon1: FloatArray, lon2: FloatArray) -> tuple[FloatArray, FloatArray]:
-    turn, low = _two_difference(_reduced(lon1), _reduced(lon2))
-    difference, rest = _add_wrapped(turn, low)
+    turn, low = _two_difference(_reduce_longitude(lon1), _reduce_longitude(lon2))
+    difference, rest = _wrap_sum(turn, low)
     # |rest| >= |low| or rest = 0, so this fast two-sum leaves the exact error.
     unwrapped = rest + low
     return difference, low - (unwrapped - rest)
 
 
-def _reduced(lon: FloatArray) -> FloatArray:
+def _reduce_longitude(lon: FloatArray) -> FloatArray:
     """Take whole turns off absurdly large longitudes, exactly, and leave all others alone."""
     if lon.size == 0 or max(lon.max(), -lon.min()) <= _LARGE_LONGITUDE_DEG:
         return lon
@@ -302,7 +302,7 @@ def _two_difference(lon1: FloatArray, lon2: FloatArray) -> tuple[FloatArray, Flo
     return total, part2
 
 
-def _add_wrapped(total: FloatArray, low: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _wrap_sum(total: FloatArray, low: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Wrap total + low; returns the wrapped double and total less its whole turns."""
     rest = total - 360.0 * np.rint(total * (1.0 / 360.0))
     difference = rest + low

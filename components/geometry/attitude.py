@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import common_shape, shaped, squarable
+from components.arguments.checks import broadcast_results, common_shape, squarable
 from components.geometry.angles import Vector, sine_and_cosine, wrap_pi
 from dsa_des.arrays.types import FloatArray
 
@@ -44,10 +44,10 @@ def ned_to_body(
         Components along nose, right wing and down through the floor, the same unit. The length
         is kept to 1e-15 of itself, also there and back (measured 5e-16 and 6e-16).
     """
-    shape, arrays = checked(
+    shape, arrays = check_arguments(
         north=north, east=east, down=down, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
     )
-    x, y, z = shaped(shape, *ned_to_body_unchecked(*arrays))
+    x, y, z = broadcast_results(shape, *ned_to_body_unchecked(*arrays))
     return x, y, z
 
 
@@ -73,13 +73,13 @@ def body_to_ned(
     -------
     north, east, down : ndarray
     """
-    shape, (bx, by, bz, yaw, pitch, roll) = checked(
+    shape, (bx, by, bz, yaw, pitch, roll) = check_arguments(
         x=x, y=y, z=z, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
     )
     level_y, level_z = turn_axes(by, bz, -roll)
     down, level_x = turn_axes(level_z, bx, -pitch)
     north, east = turn_axes(level_x, level_y, -yaw)
-    north, east, down = shaped(shape, north, east, down)
+    north, east, down = broadcast_results(shape, north, east, down)
     return north, east, down
 
 
@@ -97,8 +97,8 @@ def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Vec
     north, east, down : ndarray
         Length 1. From body angles instead of NED angles it gives x, y, z in body axes.
     """
-    shape, arrays = checked(azimuth_rad=azimuth_rad, elevation_rad=elevation_rad)
-    north, east, down = shaped(shape, *unit_vector_unchecked(*arrays))
+    shape, arrays = check_arguments(azimuth_rad=azimuth_rad, elevation_rad=elevation_rad)
+    north, east, down = broadcast_results(shape, *unit_vector_unchecked(*arrays))
     return north, east, down
 
 
@@ -126,9 +126,9 @@ def body_angles(
     p = atan2(y, x), q = atan2(-z, hypot(x, y)): no domain error and full accuracy near ±90
     degrees, where the asin of thesis eq. 5 loses half the digits.
     """
-    shape, arrays = checked(x=x, y=y, z=z)
+    shape, arrays = check_arguments(x=x, y=y, z=z)
     wide = (np.ascontiguousarray(np.broadcast_to(a, shape or (1,))) for a in arrays)
-    p, q = shaped(shape, *body_angles_unchecked(*wide))
+    p, q = broadcast_results(shape, *body_angles_unchecked(*wide))
     return p, q
 
 
@@ -152,14 +152,14 @@ def relative_attitude(
         yaw - azimuth (0 when it flies away from us), elevation - pitch and elevation - roll, all
         wrapped into (-pi, pi].
     """
-    shape, (azimuth, elevation, yaw, pitch, roll) = checked(
+    shape, (azimuth, elevation, yaw, pitch, roll) = check_arguments(
         azimuth_rad=azimuth_rad,
         elevation_rad=elevation_rad,
         target_yaw_rad=target_yaw_rad,
         target_pitch_rad=target_pitch_rad,
         target_roll_rad=target_roll_rad,
     )
-    psi, theta, phi = shaped(shape, yaw - azimuth, elevation - pitch, elevation - roll)
+    psi, theta, phi = broadcast_results(shape, yaw - azimuth, elevation - pitch, elevation - roll)
     return wrap_pi(psi), wrap_pi(theta), wrap_pi(phi)
 
 
@@ -256,7 +256,7 @@ def turn_axes(a: FloatArray, b: FloatArray, angle: FloatArray) -> tuple[FloatArr
     return cosine * a + sine * b, cosine * b - sine * a
 
 
-def checked(**values: npt.ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
+def check_arguments(**values: npt.ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
     """Check named arguments; returns the broadcast shape and arrays of at least one axis."""
     arrays = {name: squarable(name, value) for name, value in values.items()}
     shape = common_shape(**arrays)

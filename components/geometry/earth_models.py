@@ -35,7 +35,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import positions, shaped
+from components.arguments.checks import broadcast_results, positions
 from components.geometry.angles import RAD_PER_DEG, longitude_difference_rounded, positive_turn
 from components.geometry.ellipsoid import north_east_up, radii_of_curvature, spherical_from_enu
 from components.geometry.sensor_axes import MODELS as ATTITUDE_MODELS
@@ -212,7 +212,7 @@ def geodesic_line_of_sight(
     rise = alt2 - alt1
     with np.errstate(under="ignore"):
         result = azimuth, np.arctan2(rise, ground), np.hypot(ground, rise)
-    azimuth, elevation, slant_range = (shaped(shape, x)[0] for x in result)
+    azimuth, elevation, slant_range = (broadcast_results(shape, x)[0] for x in result)
     return azimuth, elevation, slant_range
 
 
@@ -347,5 +347,5 @@ class LineOfSight:
         arrays, shape = positions(*coordinates, validate=validate)
         with np.errstate(under="ignore"):  # offsets below 1e-150 m square to zero
             seen = spherical_from_enu(*self._offsets(*arrays))
-        azimuth, elevation, range_m = shaped(shape, *seen)
+        azimuth, elevation, range_m = broadcast_results(shape, *seen)
         return azimuth, elevation, range_m

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import positions, shaped
+from components.arguments.checks import broadcast_results, positions
 from components.geometry.angles import (
     RAD_PER_DEG,
     direction_angle,
@@ -71,7 +71,7 @@ def line_of_sight(
     # Offsets below 1e-150 m square to zero, which is right to every digit asked for.
     with np.errstate(under="ignore"):
         azimuth, elevation, slant_range = spherical_from_enu(*north_east_up(*arrays))
-    azimuth, elevation, slant_range = shaped(shape, azimuth, elevation, slant_range)
+    azimuth, elevation, slant_range = broadcast_results(shape, azimuth, elevation, slant_range)
     return azimuth, elevation, slant_range
 
 
@@ -90,7 +90,7 @@ def slant_range_m(
     arrays, shape = positions(own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, False)
     with np.errstate(under="ignore"):
         north, east, up = north_east_up(*arrays)
-        (range_m,) = shaped(shape, np.sqrt(north * north + east * east + up * up))
+        (range_m,) = broadcast_results(shape, np.sqrt(north * north + east * east + up * up))
     return range_m
 
 
@@ -149,7 +149,7 @@ def line_of_sight_ned(
     )
     with np.errstate(under="ignore"):
         north, east, up = north_east_up(*arrays)
-    north, east, down = shaped(shape, north, east, 0.0 - up)
+    north, east, down = broadcast_results(shape, north, east, 0.0 - up)
     return north, east, down
 
 
@@ -196,8 +196,8 @@ def north_east_up(
     dlat = lat2 - lat1  # rounds, but relative to itself: nothing is wrapped afterwards
     dlat *= 0.5
     sin_half = np.sin(dlat * RAD_PER_DEG)
-    cos_half = _cos_beside(sin_half, dlat)
-    cos2 = _cos_of_other(lat2, sin1, cos1, sin_half, cos_half)
+    cos_half = _cosine_from_sine(sin_half, dlat)
+    cos2 = _cosine_of_target(lat2, sin1, cos1, sin_half, cos_half)
 
     # sin(lat2) - sin(lat1); the cosine of the mean latitude may lose relative accuracy at the
     # pole, but here it is only ever multiplied by something of the size of the offset.
@@ -229,7 +229,7 @@ def north_east_up(
     dlon = longitude_difference_rounded(lon1, lon2)
     dlon *= 0.5
     sin_half_lon = np.sin(dlon * RAD_PER_DEG)
-    cos_half_lon = _cos_beside(sin_half_lon, dlon)
+    cos_half_lon = _cosine_from_sine(sin_half_lon, dlon)
 
     across = n2 * cos2
     across = across * sin_half_lon
@@ -250,7 +250,7 @@ def north_east_up(
     return north, east, up
 
 
-def _cos_beside(sine: FloatArray, angle_deg: FloatArray) -> FloatArray:
+def _cosine_from_sine(sine: FloatArray, angle_deg: FloatArray) -> FloatArray:
     """Cosine of degrees in ±90 whose sine is known: a square root where it loses nothing."""
     cosine = 1.0 - sine
     cosine *= 1.0 + sine
@@ -261,7 +261,7 @@ def _cos_beside(sine: FloatArray, angle_deg: FloatArray) -> FloatArray:
     return cosine
 
 
-def _cos_of_other(
+def _cosine_of_target(
     lat2: FloatArray, sin1: FloatArray, cos1: FloatArray, sin_half: FloatArray, cos_half: FloatArray
 ) -> FloatArray:
     """Cosine of the target's latitude, from ours and half the difference where nothing cancels."""

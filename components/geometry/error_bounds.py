@@ -108,7 +108,7 @@ def flat_earth_error(envelope: Envelope) -> Interval | None:
         return None
     angle, relative = local
     stretch = max(most - 1.0, 1.0 / least - 1.0)
-    return angle + _turned(least, most), stretch * (1.0 + relative) + relative / least
+    return angle + _largest_turn(least, most), stretch * (1.0 + relative) + relative / least
 
 
 def local_radii_error(envelope: Envelope, range_m: float) -> Interval | None:
@@ -142,7 +142,7 @@ def local_radii_error(envelope: Envelope, range_m: float) -> Interval | None:
     cubic = max((m_max + thick) * wide**3, r_max * long**3) / 6.0
     to_axis, convergence = 0.5 * sin_max * r_max * long**2, m_high * sin_max * wide * long
     level = (
-        _largest_together(to_axis, convergence)
+        _largest_hypot(to_axis, convergence)
         + 0.5 * slope * wide**2
         + rise * max(wide, cos_max * long)
         + cubic
@@ -195,7 +195,7 @@ def geodesic_error(envelope: Envelope) -> Interval | None:
     angle, relative = rest
     stretch = max(most - 1.0, 1.0 - least)
     off = 1.0 + math.hypot(level, drop) / range_m
-    return angle + _turned(least, most), stretch * off / least + relative
+    return angle + _largest_turn(least, most), stretch * off / least + relative
 
 
 def _from_offsets(
@@ -213,14 +213,14 @@ def _from_offsets(
     return math.asin(off / shortest_m), (level_m + slope * drop_m) / range_m
 
 
-def _largest_together(to_axis: float, convergence: float) -> float:
+def _largest_hypot(to_axis: float, convergence: float) -> float:
     """Return the largest hypot(to_axis y², convergence x y) over x² + y² = 1."""
     c, p = convergence**2, to_axis**2
     share = 1.0 if c <= 2.0 * p else c / (2.0 * (c - p))
     return math.sqrt(share * (c - (c - p) * share))
 
 
-def _turned(least: float, most: float) -> float:
+def _largest_turn(least: float, most: float) -> float:
     """Return the largest turn of a vector whose components are stretched by least to most."""
     return math.asin((most - least) / (most + least))
 

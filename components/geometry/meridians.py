@@ -37,7 +37,7 @@ def turn_of_north_rad(here_deg: Place, there_deg: Place) -> FloatArray:
     return np.asarray(along * np.sin(np.radians(0.5 * (lat + other_lat))))
 
 
-def turned_by_meridians(north_east_up: FloatArray, here_deg: Place, there_deg: Place) -> FloatArray:
+def rotate_to_meridian(north_east_up: FloatArray, here_deg: Place, there_deg: Place) -> FloatArray:
     """Return vectors (3, n) in north and east of a place near by."""
     angle = turn_of_north_rad(here_deg, there_deg)
     north, east, up = north_east_up

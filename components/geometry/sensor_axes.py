@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import shaped
+from components.arguments.checks import broadcast_results
 from components.geometry.angles import direction_angle, slope_angle, wrap_pi_unchecked
 from components.geometry.attitude import (
     azimuth_off_nose,
     body_angles,
     body_angles_unchecked,
     body_to_ned,
-    checked,
+    check_arguments,
     ned_to_body,
     ned_to_body_unchecked,
     turn_axes,
@@ -29,7 +29,7 @@ from dsa_des.arrays.types import FloatArray
 _ANY_AZIMUTH_RAD2 = math.pi**2 / 3.0
 
 
-def turned_variances(
+def rotate_variances(
     azimuth_rad: FloatArray,
     elevation_rad: FloatArray,
     azimuth_variance_rad2: FloatArray,
@@ -132,14 +132,14 @@ def sensor_angles(
     if not validate:
         given: tuple[Any, ...] = azimuth_rad, elevation_rad, yaw_rad, pitch_rad
         return _angle_by_angle(*given)
-    shape, (azimuth, elevation, yaw, pitch, _) = checked(
+    shape, (azimuth, elevation, yaw, pitch, _) = check_arguments(
         azimuth_rad=azimuth_rad,
         elevation_rad=elevation_rad,
         yaw_rad=yaw_rad,
         pitch_rad=pitch_rad,
         roll_rad=roll_rad,
     )
-    p, q = shaped(shape, *_angle_by_angle(azimuth, elevation, yaw, pitch))
+    p, q = broadcast_results(shape, *_angle_by_angle(azimuth, elevation, yaw, pitch))
     return p, q
 
 

@@ -41,7 +41,7 @@ class TrajectoryState:
     roll_rad: FloatArray
     present: npt.NDArray[np.bool_]
 
-    def reshaped(self, shape: tuple[int, ...]) -> TrajectoryState:
+    def reshape(self, shape: tuple[int, ...]) -> TrajectoryState:
         """Return the same state with its arrays in another shape."""
         return TrajectoryState(*(array.reshape(shape) for array in self.arrays()))
 

@@ -34,9 +34,9 @@ class Altitudes:
         #: Whether horizons count from time 0, not from the phases of a flight.
         self.from_now: bool = values["bands_add_time_to_maneuver"]
         # Where horizons count from now, level flights are asked for that begin beyond them.
-        self._far_ones_alike(math.inf if self.from_now else self.lookahead_s, step)
+        self._merge_far_altitudes(math.inf if self.from_now else self.lookahead_s, step)
 
-    def against(self, intruder: State, detector: Detector) -> "AltitudeConflicts":
+    def find_conflicts(self, intruder: State, detector: Detector) -> "AltitudeConflicts":
         """Return when the flights meet a volume about one intruder of each, (n, 1)."""
         return AltitudeConflicts(self, intruder, detector)
 
@@ -66,7 +66,7 @@ class Altitudes:
         self.level_s = self.held_s + peak / a
         self._rate, self._acceleration = up * peak, up * a
 
-    def _far_ones_alike(self, lookahead_s: float, step: float) -> None:
+    def _merge_far_altitudes(self, lookahead_s: float, step: float) -> None:
         """Choose the altitudes whose flights differ within the lookahead.
 
         Those whose climb is still held then are flown alike to either side, so one of them to each
@@ -84,17 +84,17 @@ class Altitudes:
         #: Which altitudes are looked at, and who of them stands for each altitude.
         self._looked_at = first + np.arange(width)
         self._stands_for = np.clip(np.arange(count) - first, 0, width - 1)
-        chosen = self.chosen
+        chosen = self.select_examined
         self._level_m = chosen(self.values)
         #: Times at which the flights that are looked at have accelerated, held and are level.
         self.phases_s = [chosen(t) for t in (self.accelerated_s, self.held_s, self.level_s)]
         self._speed, self._push = chosen(self._rate), chosen(self._acceleration)
 
-    def chosen(self, of_each: FloatArray) -> FloatArray:
+    def select_examined(self, of_each: FloatArray) -> FloatArray:
         """Return values (n, k) of all altitudes for those that are looked at."""
         return np.take_along_axis(of_each, self._looked_at, axis=1)
 
-    def of_all(self, chosen: BoolArray) -> BoolArray:
+    def spread_to_all(self, chosen: BoolArray) -> BoolArray:
         """Return for all altitudes what holds for those that were looked at."""
         return np.take_along_axis(chosen, self._stands_for, axis=1)
 
@@ -131,15 +131,17 @@ class AltitudeConflicts:
         t1, t2, t3 = altitudes.phases_s
         self._level_s = np.zeros(t1.shape) if altitudes.instantaneous else t3 + 1.0
         # Who is level beyond a horizon from now keeps clear of a cylinder all the time before it.
-        self._level = self._over(self._level_s, self._from_now and detector.volume is None)
+        self._level = self._straight_flight_span(
+            self._level_s, self._from_now and detector.volume is None
+        )
         if altitudes.instantaneous:
             return
         self._held_s, self._held_until_s = np.maximum(t1, 0.0), np.minimum(t2, self._lookahead_s)
-        self._held = self._over(self._held_s, False)
-        self._at_seconds(np.zeros(t1.shape), t1)
-        self._at_seconds(np.ceil(t2), t3 + 1.0)
+        self._held = self._straight_flight_span(self._held_s, False)
+        self._find_inside_at_seconds(np.zeros(t1.shape), t1)
+        self._find_inside_at_seconds(np.ceil(t2), t3 + 1.0)
 
-    def _over(self, begin_s: FloatArray, whole: bool) -> Span:
+    def _straight_flight_span(self, begin_s: FloatArray, whole: bool) -> Span:
         """Return when flights that are straight from some times on meet it, or would all along."""
         if whole:
             flight, begin_s = self._altitudes.flight_at(begin_s), np.zeros(begin_s.shape)
@@ -149,7 +151,7 @@ class AltitudeConflicts:
         # Beyond the lookahead, at whose end the volume may be asked for.
         return self._detector.span(flight, self._intruder, begin_s, self._lookahead_s + 1.0)
 
-    def _at_seconds(self, first_s: FloatArray, last_s: FloatArray) -> None:
+    def _find_inside_at_seconds(self, first_s: FloatArray, last_s: FloatArray) -> None:
         """Find which flights are inside at the whole seconds of an interval."""
         last_s = np.floor(np.minimum(last_s, self._lookahead_s))
         # All flights of an acceleration share their first seconds, so these are few.
@@ -163,24 +165,24 @@ class AltitudeConflicts:
 
     def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Tell which flights meet it."""
-        end_s = np.minimum(self._after(horizon_s, self._level_s), self._lookahead_s)
+        end_s = np.minimum(self._conflicts_after(horizon_s, self._level_s), self._lookahead_s)
         begin_s = np.maximum(from_s, self._level_s)
         met = meets(self._level, begin_s, end_s) | meets_at(self._level, from_s, begin_s, end_s)
         if not self._altitudes.instantaneous:
-            end_s = np.minimum(self._after(horizon_s, self._held_s), self._held_until_s)
+            end_s = np.minimum(self._conflicts_after(horizon_s, self._held_s), self._held_until_s)
             begin_s = np.maximum(from_s, self._held_s)
             met |= meets(self._held, begin_s, end_s) | meets_at(self._held, from_s, begin_s, end_s)
         last_s = horizon_s if self._from_now else np.inf
         for time_s, inside in self._seconds:
             met |= inside & (time_s >= from_s) & (time_s <= last_s)
-        return self._altitudes.of_all(met & np.asarray(from_s <= horizon_s))
+        return self._altitudes.spread_to_all(met & np.asarray(from_s <= horizon_s))
 
-    def _after(self, horizon_s: Any, phase_s: FloatArray) -> FloatArray:
+    def _conflicts_after(self, horizon_s: Any, phase_s: FloatArray) -> FloatArray:
         return np.asarray(horizon_s if self._from_now else horizon_s + phase_s)
 
-    soon = unsafe
+    conflicts_soon = unsafe
 
-    def unsafe_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
+    def conflicts_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
         """Tell which flights meet it until a time (n, 1)."""
         horizon_s = np.minimum(horizon_s, self._lookahead_s)
         until_s = np.minimum(until_s, horizon_s)
@@ -191,4 +193,4 @@ class AltitudeConflicts:
             met |= meets(self._held, self._held_s, np.minimum(self._held_until_s, until_s))
         for time_s, inside in self._seconds:
             met |= inside & (time_s <= until_s)
-        return self._altitudes.of_all(met)
+        return self._altitudes.spread_to_all(met)

@@ -16,15 +16,15 @@ from components.guidance.intervals import (
     FULL_TURN,
     Band,
     Interval,
-    named_recovery,
-    painted,
-    same_place,
+    is_same_value,
+    paint_bands,
+    rename_to_recovery,
 )
 from components.guidance.kinds import ManoeuvreKind, kind_of
 from components.guidance.recovery import Recovery, recover, recovery_cylinder
 from components.guidance.regions import GuidedIntruders, Regions, intervals_of
 from components.guidance.situation import State
-from components.well_clear.detection import Bounds, some_bounds
+from components.well_clear.detection import Bounds, select_bounds
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
@@ -56,26 +56,29 @@ def resolution(
     least = REGIONS.index(corrective_region)
     red = [is_red(one, least) for one in bands]
     turns = (-FULL_TURN, 0.0, FULL_TURN) if cyclic else (0.0,)
-    if cyclic and same_place(own_value, FULL_TURN):
+    if cyclic and is_same_value(own_value, FULL_TURN):
         # As near to north it lies in the first band, and no way to the left is found.
         if not red[0]:
             return None
         low, high = -math.inf, _stretches(bands, red, (FULL_TURN,))[0][1]
     else:
         for low, high in _stretches(bands, red, turns):
-            on_edge = same_place(low, own_value) or same_place(high, own_value)
+            on_edge = is_same_value(low, own_value) or is_same_value(high, own_value)
             if low < own_value < high and not on_edge:
                 break
         else:
             return None
     first, last = bands[0].low + turns[0], bands[-1].high + turns[-1]
-    low_end = -math.inf if same_place(low, first) else low
-    high_end = math.inf if same_place(high, last) else high
+    low_end = -math.inf if is_same_value(low, first) else low
+    high_end = math.inf if is_same_value(high, last) else high
     if cyclic:
         low_end = _direction(own_value, low_end, -math.inf)
         high_end = _direction(own_value, high_end, math.inf)
-    down, up = away(own_value, low_end, cyclic), away(own_value, high_end, cyclic)
-    nearer = up <= down or same_place(up, down)
+    down, up = (
+        distance_to_edge(own_value, low_end, cyclic),
+        distance_to_edge(own_value, high_end, cyclic),
+    )
+    nearer = up <= down or is_same_value(up, down)
     return Resolution(low_end, high_end, bool(math.isfinite(high_end) and nearer))
 
 
@@ -96,7 +99,7 @@ def _stretches(
             if result:
                 start, end = result[-1]
                 added = FULL_TURN if start < turn and len(turns) > 1 else 0.0
-                if same_place(end - turn + added, band.low + added):
+                if is_same_value(end - turn + added, band.low + added):
                     result[-1] = start, high
                     continue
             result.append((low, high))
@@ -111,13 +114,13 @@ def is_red(band: Band, least: int) -> bool:
 def _direction(own_value: float, edge: float, none: float) -> float:
     """Return an edge within [0, 2 pi), or `none` if it is half a turn away or more."""
     way = abs(edge - own_value)
-    if not math.isfinite(edge) or way >= math.pi or same_place(way, math.pi):
+    if not math.isfinite(edge) or way >= math.pi or is_same_value(way, math.pi):
         return none
     wrapped = edge % FULL_TURN
-    return 0.0 if same_place(wrapped, FULL_TURN) else wrapped
+    return 0.0 if is_same_value(wrapped, FULL_TURN) else wrapped
 
 
-def away(own_value: float, edge: float, cyclic: bool) -> float:
+def distance_to_edge(own_value: float, edge: float, cyclic: bool) -> float:
     """Return how far an edge is from the own value, the shorter way round a circle."""
     way = abs(edge - own_value)
     return min(way, FULL_TURN - way) if cyclic and math.isfinite(way) else way
@@ -169,14 +172,14 @@ def guidance(
     """
     alone = [
         GuidedIntruders(
-            _one(i.state),
+            _only_state(i.state),
             i.alerter,
             np.array([i.early_level]),
-            bounds=None if i.bounds is None else some_bounds(i.bounds, np.newaxis),
+            bounds=None if i.bounds is None else select_bounds(i.bounds, np.newaxis),
         )
         for i in intruders
     ]
-    return guidance_of_many(kind_name, configuration, _one(own), alone)[0]
+    return guidance_of_many(kind_name, configuration, _only_state(own), alone)[0]
 
 
 def guidance_of_many(
@@ -212,7 +215,7 @@ def guidance_of_many(
                 recoveries += recover(kind_name, configuration, own.rows(rows), theirs)
         ways = iter(recoveries)
         for part in parts:
-            made += part.painted(ways if recoveries else None)
+            made += part.paint_bands(ways if recoveries else None)
     return made
 
 
@@ -220,7 +223,7 @@ def _parts(rows: IntArray, most: int) -> list[IntArray]:
     return [rows[start : start + most] for start in range(0, len(rows), most)]
 
 
-def _one(state: State) -> State:
+def _only_state(state: State) -> State:
     return State(*(np.asarray(part, dtype=np.float64).reshape(1) for part in state))
 
 
@@ -249,10 +252,10 @@ class _Part:
             on = on & ~stuck
         self._at_once = np.zeros(len(on), dtype=bool)
         if kind.instantaneous:
-            self._at_once = regions.inside_corrective()
+            self._at_once = regions.is_in_corrective()
         self._painter = _Painter(configuration, kind, layers, own.up_m)
 
-    def painted(self, ways: Iterator[tuple[Recovery, list[Interval]]] | None) -> list[Guidance]:
+    def paint_bands(self, ways: Iterator[tuple[Recovery, list[Interval]]] | None) -> list[Guidance]:
         """Return the bands, with the next of the `ways` of recovery for each that is saturated."""
         return [
             self._painter.guidance(row, next(ways) if stuck and ways else None, at_once)
@@ -300,6 +303,6 @@ class _Painter:
         ]
         if ways:
             layers.append(("RECOVERY", ways, False))
-        line = painted(layers, least, most)
+        line = paint_bands(layers, least, most)
         result = Guidance(own_value, line, recovery, line)
-        return result._replace(bands=named_recovery(line)) if result.recovers else result
+        return result._replace(bands=rename_to_recovery(line)) if result.recovers else result

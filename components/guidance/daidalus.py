@@ -10,7 +10,7 @@ from pydantic import Field, field_validator
 from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Alerter, Configuration, Deviations, margins
 from components.guidance.bands import Guidance, guidance_of_many, resolution
-from components.guidance.intervals import FULL_TURN, same_place
+from components.guidance.intervals import FULL_TURN, is_same_value
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
 from components.messages.alerts import (
@@ -18,7 +18,7 @@ from components.messages.alerts import (
     BAND_REGIONS,
     AlertLevels,
     GuidanceBands,
-    never_reached,
+    note_unreached_level,
 )
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters, Producer, ScenePath
@@ -61,7 +61,7 @@ _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 Changes = tuple[float, float]
 
 
-def changes_out(
+def changes_out_of_bands(
     kind_name: str,
     configuration: Configuration,
     alerter: Alerter,
@@ -91,7 +91,7 @@ def bands_around(
 ) -> list[Guidance | None]:
     """Return the bands at some instants, each by itself; None where nothing is known yet.
 
-    Parameters are those of `changes_out`.
+    Parameters are those of `changes_out_of_bands`.
     """
     result: list[Guidance | None] = [None] * len(rows)
     own = np.array([alerts.own_motion[name][rows] for name in _OWN]).reshape(len(_OWN), -1)
@@ -146,15 +146,15 @@ def smaller(changes: tuple[float, float]) -> float | None:
     None where there is neither.
     """
     low, high = changes
-    change = high if high <= -low or same_place(high, -low) else low
+    change = high if high <= -low or is_same_value(high, -low) else low
     return change if math.isfinite(change) else None
 
 
-def why_never_steers(
+def explain_no_steering(
     level: int, configuration: Configuration, alerter: Alerter, producers: Sequence[Producer]
 ) -> list[str]:
     """Say where no alert reaches the level from which somebody steers, or no band is red."""
-    said = never_reached("level", level, producers)
+    said = note_unreached_level("level", level, producers)
     if configuration.corrective_level(alerter) is None:
         said.append(
             f"no level of the alerter {alerter.name} has the region "
@@ -203,7 +203,7 @@ class DaidalusGuidance(Component):
 
     def warnings(self) -> list[str]:
         """Say where no alert reaches its level, or no level has bands."""
-        said = never_reached("level", self.p.level, self.context.producers)
+        said = note_unreached_level("level", self.p.level, self.context.producers)
         if all(level.region == "NONE" for level in self._alerter.levels):
             said.append(f"no level of the alerter {self._alerter.name} has a region: no bands")
         return said

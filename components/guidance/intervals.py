@@ -26,7 +26,7 @@ class Interval(NamedTuple):
     high: float
 
 
-def same_place(one: float, other: float) -> bool:
+def is_same_value(one: float, other: float) -> bool:
     """Tell whether two guidance values are one place.
 
     As `nearly_equal` of `components.well_clear.relative_motion`, for two numbers at a time: arrays
@@ -63,19 +63,19 @@ def clear_intervals(
             result.append(Interval(float(values[first]), float(values[end - 1])))
     if not cyclic:
         clipped = [Interval(max(low, least), min(high, most)) for low, high in result]
-        return [one for one in clipped if one.low < one.high and not same_place(*one)]
-    return [part for one in result for part in _wrapped(one)]
+        return [one for one in clipped if one.low < one.high and not is_same_value(*one)]
+    return [part for one in result for part in _wrap_interval(one)]
 
 
-def _wrapped(interval: Interval) -> list[Interval]:
+def _wrap_interval(interval: Interval) -> list[Interval]:
     """Return an interval of directions within [0, 2 pi], in two where it holds 0."""
-    if interval.high - interval.low >= FULL_TURN or same_place(
+    if interval.high - interval.low >= FULL_TURN or is_same_value(
         interval.high - interval.low, FULL_TURN
     ):
         return [Interval(0.0, FULL_TURN)]
     low, high = interval.low % FULL_TURN, interval.high % FULL_TURN
-    low = 0.0 if same_place(low, FULL_TURN) else low
-    high = FULL_TURN if same_place(high, 0.0) else high
+    low = 0.0 if is_same_value(low, FULL_TURN) else low
+    high = FULL_TURN if is_same_value(high, 0.0) else high
     return [Interval(low, high)] if low < high else [Interval(low, FULL_TURN), Interval(0.0, high)]
 
 
@@ -87,7 +87,7 @@ class Band(NamedTuple):
     region: str
 
 
-def painted(
+def paint_bands(
     layers: list[tuple[str, list[Interval], bool]], least: float, most: float
 ) -> list[Band]:
     """Return the bands from the lowest to the highest value."""
@@ -95,7 +95,7 @@ def painted(
     for _, intervals, _ in layers:
         for interval in intervals:
             for value in interval:
-                if not any(same_place(value, known) for known in places):
+                if not any(is_same_value(value, known) for known in places):
                     places.append(value)
     places.sort()
     bands = []
@@ -106,17 +106,17 @@ def painted(
             if within != outside:
                 region = name
         bands.append(Band(low, high, region))
-    return joined(bands)
+    return join_neighbours(bands)
 
 
-def named_recovery(bands: list[Band]) -> list[Band]:
+def rename_to_recovery(bands: list[Band]) -> list[Band]:
     """Return the bands with NONE called RECOVERY, equal neighbours joined."""
-    return joined(
+    return join_neighbours(
         Band(low, high, "RECOVERY" if region == "NONE" else region) for low, high, region in bands
     )
 
 
-def joined(bands: Iterable[Band]) -> list[Band]:
+def join_neighbours(bands: Iterable[Band]) -> list[Band]:
     """Return bands from the lowest to the highest value with equal neighbours as one."""
     result: list[Band] = []
     for band in bands:

@@ -40,7 +40,7 @@ class Steps(NamedTuple):
         """Whether a manoeuvre takes no time."""
         return not self.step_time_s.any()
 
-    def against(self, intruder: State, detector: Detector) -> "StepConflicts":
+    def find_conflicts(self, intruder: State, detector: Detector) -> "StepConflicts":
         """Return when the manoeuvres meet a volume about one intruder of each, (n, 1)."""
         return StepConflicts(self, intruder, detector)
 
@@ -141,7 +141,7 @@ class StepConflicts:
             lasts_s = steps.time_s + steps.step_time_s
             self._while_flown = meets(self._span, steps.time_s, lasts_s) & steps.there
 
-    def soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
+    def conflicts_soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Tell which steps meet it after the manoeuvre."""
         time_s = self._steps.time_s
         begin_s = np.maximum(from_s, time_s)
@@ -151,7 +151,7 @@ class StepConflicts:
 
     def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Tell which steps meet it, or lie beyond one that meets it while it is flown."""
-        met = self.soon(from_s, horizon_s)
+        met = self.conflicts_soon(from_s, horizon_s)
         if self._steps.instantaneous:
             return met
         first = np.ceil(from_s / self._steps.step_time_s)
@@ -161,9 +161,9 @@ class StepConflicts:
         last = np.floor(last_s / self._steps.step_time_s)
         due = (self._count >= first) & (self._count <= last)
         due = due & (self._steps.time_s < self._lookahead_s) & np.asarray(from_s <= horizon_s)
-        return met | self._beyond(self._while_flown & due)
+        return met | self._conflicts_beyond(self._while_flown & due)
 
-    def unsafe_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
+    def conflicts_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
         """Tell which steps meet it until a time (n, 1), or while they are flown until then."""
         horizon_s = np.minimum(horizon_s, self._lookahead_s)
         until_s = np.minimum(until_s, horizon_s)
@@ -173,10 +173,10 @@ class StepConflicts:
         met &= self._steps.there
         if not self._steps.instantaneous:
             early = self._count <= np.floor(until_s / self._steps.step_time_s)
-            met |= self._beyond(self._while_flown & early)
+            met |= self._conflicts_beyond(self._while_flown & early)
         return met
 
-    def _beyond(self, met: BoolArray) -> BoolArray:
+    def _conflicts_beyond(self, met: BoolArray) -> BoolArray:
         if not met.any():
             return met
         # Outwards to either side, from no manoeuvre on.

@@ -5,8 +5,14 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 from components.alert_configuration.configuration import REGIONS, Configuration
-from components.guidance.bands import Guidance, Resolution, away, is_red, resolution
-from components.guidance.intervals import FULL_TURN, Band, joined, named_recovery, same_place
+from components.guidance.bands import Guidance, Resolution, distance_to_edge, is_red, resolution
+from components.guidance.intervals import (
+    FULL_TURN,
+    Band,
+    is_same_value,
+    join_neighbours,
+    rename_to_recovery,
+)
 from components.guidance.recovery import Recovery
 
 _OUTSIDE = -1
@@ -42,20 +48,20 @@ class BandMemory:
             self._clear()
         self._last_s = now_s
         if self._counts:
-            line = self._counted(line)
+            line = self._filter_colours(line)
         if self._persists:
             line = self._persisting(now_s, line, own_value)
         # Ways out that are remembered count as long as one is needed, also where none is left now.
         if recovery is None:
             line = [b._replace(region="NONE") if b.region == "RECOVERY" else b for b in line]
-        line = joined(line)
+        line = join_neighbours(line)
         recovers = recovery is not None and recovery.time_s >= 0.0
-        bands = named_recovery(line) if recovers else line
+        bands = rename_to_recovery(line) if recovers else line
         if self._persists:
             self._remember(bands, own_value)
         return bands
 
-    def _counted(self, line: list[Band]) -> list[Band]:
+    def _filter_colours(self, line: list[Band]) -> list[Band]:
         """Return the line in which each colour is the m-th largest of its place's last n.
 
         Each place of the line and of the memory stays one, also where the colour does not change.
@@ -99,7 +105,7 @@ class BandMemory:
         while at < max(len(places), len(self._places)):
             mine = self._places[at] if at < len(self._places) else math.inf
             other = places[at] if at < len(places) else math.inf
-            if not same_place(mine, other):
+            if not is_same_value(mine, other):
                 if mine < other:
                     places.insert(at, mine)
                     left.insert(at, left[at])
@@ -119,7 +125,7 @@ class BandMemory:
         region = _region_at(line, own_value)
         colour, remembered = REGIONS.index(region), REGIONS.index(held.region)
         if colour < remembered and 0.0 <= now_s - self._risen_s < self._persistence_s:
-            return _painted_over(line, held, remembered)
+            return _paint_over(line, held, remembered)
         if region in _SEVERE and colour > remembered:
             self._risen_s = now_s
         return line
@@ -143,8 +149,8 @@ def band_at(bands: list[Band], value: float) -> int:
         i
         for i, band in enumerate(bands)
         if band.low <= value <= band.high
-        or same_place(band.low, value)
-        or same_place(band.high, value)
+        or is_same_value(band.low, value)
+        or is_same_value(band.high, value)
     ]
     if not holding:  # beyond the limits
         return 0 if value < bands[0].low else len(bands) - 1
@@ -160,15 +166,15 @@ def _region_at(bands: list[Band], value: float) -> str:
     return bands[band_at(bands, value)].region
 
 
-def _painted_over(line: list[Band], held: Band, remembered: int) -> list[Band]:
+def _paint_over(line: list[Band], held: Band, remembered: int) -> list[Band]:
     """Return the line with a band painted over those of milder regions."""
     spans = [(held.low, held.high)]
-    if held.high > line[-1].high and not same_place(held.high, line[-1].high):
+    if held.high > line[-1].high and not is_same_value(held.high, line[-1].high):
         spans = [(held.low, line[-1].high), (line[0].low, held.high - FULL_TURN)]
     places = [line[0].low, *(band.high for band in line)]
     least, most = places[0], places[-1]
     for value in (edge for span in spans for edge in span):
-        if least < value < most and not any(same_place(known, value) for known in places):
+        if least < value < most and not any(is_same_value(known, value) for known in places):
             places.append(value)
     places.sort()
     made = []
@@ -247,9 +253,9 @@ class ResolutionMemory:
         if not (math.isfinite(old) and math.isfinite(raw)):
             return False
         beyond = self._outwards(side, own_value, old)
-        if not (_surely_below(beyond, math.pi) if self._cyclic else beyond >= 0.0):
+        if not (_is_surely_below(beyond, math.pi) if self._cyclic else beyond >= 0.0):
             return False
-        if not holds and not _surely_below(self._outwards(side, raw, old), self._near):
+        if not holds and not _is_surely_below(self._outwards(side, raw, old), self._near):
             return False
         return self._leads(self._band_of(side, raw, bands), band_at(bands, old), bands)
 
@@ -260,12 +266,12 @@ class ResolutionMemory:
 
     def _band_of(self, side: int, edge: float, bands: list[Band]) -> int:
         """Return which band that is not red begins above an edge, or ends below it."""
-        if self._cyclic and (same_place(edge, 0.0) or same_place(edge, FULL_TURN)):
+        if self._cyclic and (is_same_value(edge, 0.0) or is_same_value(edge, FULL_TURN)):
             return 0 if side == _HIGH else len(bands) - 1
         free = [i for i, band in enumerate(bands) if not is_red(band, self._least_red)]
         if side == _HIGH:
-            return next((i for i in free if same_place(bands[i].low, edge)), -1)
-        return next((i for i in reversed(free) if same_place(bands[i].high, edge)), -1)
+            return next((i for i in free if is_same_value(bands[i].low, edge)), -1)
+        return next((i for i in reversed(free) if is_same_value(bands[i].high, edge)), -1)
 
     def _leads(self, start: int, end: int, bands: list[Band]) -> bool:
         """Tell whether bands lead to another one, towards the preferred side, and none is red."""
@@ -291,8 +297,8 @@ class ResolutionMemory:
             if not self._prefers_high:
                 self._switch(now_s, raw, shrinks)
         else:
-            down, up = (away(own_value, edge, self._cyclic) for edge in (low, high))
-            nearer_high = up <= down or same_place(up, down)
+            down, up = (distance_to_edge(own_value, edge, self._cyclic) for edge in (low, high))
+            nearer_high = up <= down or is_same_value(up, down)
             other = self._shrinks[_LOW if self._prefers_high else _HIGH]
             mine = self._shrinks[_HIGH if self._prefers_high else _LOW]
             if self._since_s is None:
@@ -309,8 +315,8 @@ class ResolutionMemory:
                 self._shown[side] = raw[side]
 
 
-def _surely_below(one: float, other: float) -> bool:
-    return one < other and not same_place(one, other)
+def _is_surely_below(one: float, other: float) -> bool:
+    return one < other and not is_same_value(one, other)
 
 
 class Remembered(NamedTuple):

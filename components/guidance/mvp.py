@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from components.geometry import enu_to_geodetic, line_of_sight_ned
-from components.guidance.potential import KeptApart, Others, conflicts, may_resume, pushed
+from components.guidance.potential import KeptApart, Others, conflicts, may_resume, push_velocity
 from components.messages.alerts import AlertLevels
 from components.messages.reach import FarthestLook
 from components.messages.steering import Velocities
@@ -121,17 +121,17 @@ class VoltagePotential(Component):
             unknown = np.flatnonzero(~np.isin(run, self._known.replica))
             if len(unknown) and self.p.goal_m is not None:
                 new.goal[:, unknown] = self._goal(new.goal[:, unknown], yaw[unknown])
-            known = self._known.continued(new) if len(self._known) else new
+            known = self._known.latest_or_new(new) if len(self._known) else new
             seen = Others(*(part[:, rows] for part in others))
             own = own_mps[:, rows]
             now = conflicts(seen, self._kept) & heard[rows]
             done = may_resume(seen, own, self._kept) | ~np.isfinite(own[0])[:, np.newaxis]
             active = now | (known.active.T & ~(done & heard[rows]))
-            velocity = self._own_way(known, place[:, rows])
+            velocity = self._undisturbed_velocity(known, place[:, rows])
             velocity = np.where(active.any(axis=1), own, velocity)
             with np.errstate(invalid="ignore"):
-                out = pushed(seen, own, now, self._kept)
-            velocity = self._cut(np.where(now.any(axis=1), out, velocity))
+                out = push_velocity(seen, own, now, self._kept)
+            velocity = self._limit_speed(np.where(now.any(axis=1), out, velocity))
             # Nothing is told to who has not been steered, and flies its own way without it.
             silent = np.isnan(known.last_mps[0]) & ~active.any(axis=1) & (self.p.goal_m is None)
             same = (velocity == known.last_mps).all(axis=0) | silent
@@ -139,11 +139,11 @@ class VoltagePotential(Component):
             told = (velocity != known.last_mps).any(axis=0) & np.isfinite(velocity[0])
             commanded[:, rows[told]] = velocity[:, told]
             newer = known.with_columns(active=active.T.copy(), last_mps=velocity)
-            self._known = self._known.after(run, newer, wake.first_run)
+            self._known = self._known.replace_runs(run, newer, wake.first_run)
         return self._velocities(wake, commanded)
 
-    def _own_way(self, known: KeyedTable, place: FloatArray) -> FloatArray:
-        """Return the velocity (2, n) of who has no conflict."""
+    def _undisturbed_velocity(self, known: KeyedTable, place: FloatArray) -> FloatArray:
+        """Return the velocity (2, n) to fly without a conflict."""
         if self.p.goal_m is None:
             return self.p.speed_mps * np.stack([np.sin(known.track), np.cos(known.track)])
         north, east, _ = line_of_sight_ned(*place, *known.goal, validate=False)
@@ -164,7 +164,7 @@ class VoltagePotential(Component):
             )
         )  # fmt: skip
 
-    def _cut(self, velocity: FloatArray) -> FloatArray:
+    def _limit_speed(self, velocity: FloatArray) -> FloatArray:
         """Return velocities no larger than the largest."""
         speed_mps = np.hypot(*velocity)
         return np.asarray(velocity * np.minimum(1.0, self.p.most_mps / np.maximum(speed_mps, 1e-9)))

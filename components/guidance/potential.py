@@ -63,7 +63,9 @@ def may_resume(others: Others, own_mps: FloatArray, kept: KeptApart) -> BoolArra
     return np.asarray(past & (range_m >= kept.radius_m) & ~beside)
 
 
-def pushed(others: Others, own_mps: FloatArray, pushing: BoolArray, kept: KeptApart) -> FloatArray:
+def push_velocity(
+    others: Others, own_mps: FloatArray, pushing: BoolArray, kept: KeptApart
+) -> FloatArray:
     """Return the velocity (2, n) that some others push one's own to.
 
     Notes

@@ -9,7 +9,7 @@ import numpy as np
 from components.alert_configuration.configuration import Configuration
 from components.guidance.intervals import Interval
 from components.guidance.kinds import Conflicts, kind_of
-from components.guidance.regions import GuidedIntruders, Regions, any_interval, intervals_of
+from components.guidance.regions import GuidedIntruders, Regions, has_interval, intervals_of
 from components.guidance.situation import Detector, State
 from components.well_clear.tcas import recovery_sizes_m
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -52,7 +52,7 @@ def recovery_cylinder(configuration: Configuration, altitude_m: FloatArray) -> S
     return result[0], result[1]
 
 
-def _of_row(sizes: FloatArray, row: int) -> tuple[float, float]:
+def _sizes_of_row(sizes: FloatArray, row: int) -> tuple[float, float]:
     return float(sizes[0][row]), float(sizes[1][row])
 
 
@@ -79,7 +79,7 @@ class _Search:
         self._intruders = intruders
         self._sizes = recovery_cylinder(configuration, own.up_m)
         regions = Regions(configuration, self._kind, own, intruders)
-        _, self._concerned = regions.concerned(configuration["corrective_region"])
+        _, self._concerned = regions.concerned_intruders(configuration["corrective_region"])
         self._volumes = [regions.conflicts(one.intruder, one.level) for one in self._concerned]
         # Cylinder about each intruder that counts, of the sizes that are tried.
         self._cylinders: list[Conflicts] = []
@@ -93,7 +93,7 @@ class _Search:
         sizes, shrinks = np.array(self._sizes), np.zeros(count, dtype=np.int64)
 
         def smaller(rows: IntArray) -> IntArray:
-            """Make the cylinders of rows smaller; return those of whom another is looked at."""
+            """Shrink the cylinders of rows; return the rows for which a smaller one is tried."""
             ends = np.ones(len(rows), dtype=bool)
             if values["ca_bands"]:
                 reduced = sizes[:, rows] * (1.0 - values["ca_factor"])
@@ -102,7 +102,7 @@ class _Search:
                 # That of a collision is not looked at again: there is neither a time nor a way.
                 ends = (sizes[0, rows] <= nmac[0]) & (sizes[1, rows] <= nmac[1])
             for row in rows[ends].tolist():
-                result[row] = Recovery(-math.inf, _of_row(sizes, row), int(shrinks[row])), []
+                result[row] = Recovery(-math.inf, _sizes_of_row(sizes, row), int(shrinks[row])), []
             return rows[~ends]
 
         self._try(np.repeat(nmac, count).reshape(2, count))
@@ -114,14 +114,16 @@ class _Search:
             rows = self._rows_with_a_way(todo, sizes, smaller)
             if not len(rows):
                 break
-            part = self._of(rows)
+            part = self._select_rows(rows)
             part._try(sizes[:, rows])
             time_s = part._earliest()
-            clear = part._clear_at(time_s[:, np.newaxis])
+            clear = part._is_clear_until(time_s[:, np.newaxis])
             found = part._leads(clear) & (time_s <= self._latest_s)
             for index in np.flatnonzero(found).tolist():
                 row = int(rows[index])
-                recovery = Recovery(float(time_s[index]), _of_row(sizes, row), int(shrinks[row]))
+                recovery = Recovery(
+                    float(time_s[index]), _sizes_of_row(sizes, row), int(shrinks[row])
+                )
                 result[row] = recovery, intervals_of(part._kind, index, clear)
             todo = smaller(rows[~found])
         return [one for one in result if one is not None]
@@ -131,18 +133,18 @@ class _Search:
     ) -> IntArray:
         """Return the rows whose cylinders leave a way, each as small as it takes."""
         led: list[IntArray] = []
-        search, on = self._of(rows), np.ones(len(rows), dtype=bool)
+        search, on = self._select_rows(rows), np.ones(len(rows), dtype=bool)
         while on.any():
             if 2 * np.count_nonzero(on) <= len(on):  # what has ended for most is left behind
                 rows = rows[on]
-                search, on = self._of(rows), on[on]
+                search, on = self._select_rows(rows), on[on]
             search._try(sizes[:, rows])
             leads = on & search._leads(search._clear_of_cylinder())
             led.append(rows[leads])
             on = np.isin(rows, smaller(rows[on & ~leads]))
         return np.sort(np.concatenate([*led, np.empty(0, dtype=np.int64)]))
 
-    def _of(self, rows: IntArray) -> "_Search":
+    def _select_rows(self, rows: IntArray) -> "_Search":
         """Return the search of some rows, ascending: this one of all."""
         if len(rows) == len(self._kind.own_value):
             return self
@@ -153,12 +155,12 @@ class _Search:
         """Look at cylinders of sizes (r,)."""
         detector = Detector(cylinder_m=(sizes[0][:, np.newaxis], sizes[1][:, np.newaxis]))
         self._cylinders = [
-            self._kind.against(self._intruders[one.intruder].state.columns(), detector)
+            self._kind.find_conflicts(self._intruders[one.intruder].state.columns(), detector)
             for one in self._concerned
         ]
 
     def _leads(self, clear: BoolArray) -> BoolArray:
-        return any_interval(self._kind, clear)
+        return has_interval(self._kind, clear)
 
     def _clear_of_cylinder(self) -> BoolArray:
         """Tell which values keep clear of the cylinder alone."""
@@ -168,7 +170,7 @@ class _Search:
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return clear
 
-    def _clear_at(self, time_s: FloatArray) -> BoolArray:
+    def _is_clear_until(self, time_s: FloatArray) -> BoolArray:
         """Tell which values keep clear of the cylinder until a time (r, 1), and of all then.
 
         Beyond the horizon of an intruder only the cylinder counts, as far as that horizon.
@@ -177,7 +179,7 @@ class _Search:
         of_all = zip(self._concerned, self._volumes, self._cylinders, strict=True)
         for one, volume, cylinder in of_all:
             unsafe = volume.unsafe(time_s, one.horizon_s)
-            unsafe |= cylinder.unsafe_before(time_s, one.horizon_s)
+            unsafe |= cylinder.conflicts_before(time_s, one.horizon_s)
             beyond = time_s > one.horizon_s
             if beyond.any():
                 unsafe |= cylinder.unsafe(0.0, one.horizon_s) & beyond
@@ -191,7 +193,7 @@ class _Search:
         probe = np.full(count, self._lookahead_s)
         on = np.ones(count, dtype=bool)
         while on.any():
-            leads = self._leads(self._clear_at(probe[:, np.newaxis]))
+            leads = self._leads(self._is_clear_until(probe[:, np.newaxis]))
             green = np.where(on & leads, probe, green)
             red = np.where(on & ~leads, probe, red)
             probe = 0.5 * (red + green)

@@ -8,8 +8,8 @@ from components.alert_configuration.configuration import Alerter, Configuration,
 from components.guidance.intervals import DOUBLES_APART, TINY, Interval, clear_intervals
 from components.guidance.kinds import Conflicts, ManoeuvreKind
 from components.guidance.situation import Detector, State
-from components.well_clear.detection import Bounds, some_bounds
-from components.well_clear.relative_motion import nearly_equal, surely_less
+from components.well_clear.detection import Bounds, select_bounds
+from components.well_clear.relative_motion import is_surely_less, nearly_equal
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
@@ -38,7 +38,7 @@ class GuidedIntruders(NamedTuple):
             self.alerter,
             self.early_level[which],
             present,
-            some_bounds(self.bounds, which),
+            select_bounds(self.bounds, which),
         )
 
     def is_there(self) -> BoolArray:
@@ -80,20 +80,20 @@ class Regions:
         key = place, level.volume, level.uncertain
         if key not in self._conflicts:
             intruder = self._intruders[place]
-            bounds = some_bounds(intruder.bounds, (slice(None), np.newaxis))
+            bounds = select_bounds(intruder.bounds, (slice(None), np.newaxis))
             detector = Detector(level.volume, bounds=bounds if level.uncertain else None)
-            self._conflicts[key] = self._kind.against(intruder.state.columns(), detector)
+            self._conflicts[key] = self._kind.find_conflicts(intruder.state.columns(), detector)
         return self._conflicts[key]
 
-    def concerned(self, region: str) -> tuple[BoolArray, list[Concerned]]:
-        """Return for whom any level has the region, and whose volumes count."""
+    def concerned_intruders(self, region: str) -> tuple[BoolArray, list[Concerned]]:
+        """Return which intruders any level assigns to the region, and the volumes that count."""
         if region not in self._concerned:
             self._concerned[region] = self._find_concerned(region)
         return self._concerned[region]
 
     def clear(self, region: str) -> tuple[BoolArray, BoolArray]:
-        """Return for whom any level has the region, and which values (n, k) lead clear of it."""
-        known, concerned = self.concerned(region)
+        """Return which rows any level assigns to the region, and which values (n, k) avoid it."""
+        known, concerned = self.concerned_intruders(region)
         clear = self._kind.there.copy()
         for one in concerned:
             unsafe = self.conflicts(one.intruder, one.level).unsafe(0.0, one.horizon_s)
@@ -101,11 +101,11 @@ class Regions:
         return known, clear
 
     def leads(self, clear: BoolArray) -> BoolArray:
-        """Tell of whom any interval of values is clear: two neighbours within the limits."""
-        return any_interval(self._kind, clear)
+        """Return which rows have an interval of clear values: two neighbours within the limits."""
+        return has_interval(self._kind, clear)
 
-    def inside_corrective(self) -> BoolArray:
-        """Tell who is inside the corrective volume of an intruder now."""
+    def is_in_corrective(self) -> BoolArray:
+        """Return which ownships are inside the corrective volume of an intruder now."""
         inside = np.zeros(len(self._own.up_m), dtype=bool)
         for index, intruder in enumerate(self._intruders):
             level = self._configuration.corrective_level(intruder.alerter)
@@ -138,17 +138,17 @@ class Regions:
             begin_s = self._begin_s(index, level)
             early = intruder.early_level == number
             due_s = np.where(early, level.early_alerting_time_s, level.alerting_time_s)
-            ahead = (begin_s == 0.0) | surely_less(begin_s, due_s)
+            ahead = (begin_s == 0.0) | is_surely_less(begin_s, due_s)
             soon_s = min(level.alerting_time_s, self._lookahead_s)
             horizon_s = np.where(ahead, self._lookahead_s, soon_s)[:, np.newaxis]
-            met = self.conflicts(index, level).soon(0.0, horizon_s).any(axis=1)
+            met = self.conflicts(index, level).conflicts_soon(0.0, horizon_s).any(axis=1)
             of_whom = there & (ahead | met)
             if of_whom.any():
                 result.append(Concerned(index, level, of_whom, horizon_s))
         return known, result
 
 
-def any_interval(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:
+def has_interval(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:
     """Tell in which rows (n, k) two neighbours are clear, and not both beyond a limit."""
     both = clear[:, :-1] & clear[:, 1:]
     if not kind.cyclic:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from components.well_clear.detection import Bounds, detection_span
-from components.well_clear.relative_motion import Span, surely_less
+from components.well_clear.relative_motion import Span, is_surely_less
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Relative, Volume, cylinder_span
 from dsa_des.arrays.types import BoolArray, FloatArray
@@ -22,7 +22,7 @@ class State(NamedTuple):
     north_mps: FloatArray
     climb_mps: FloatArray
 
-    def less(self, other: "State") -> Relative:
+    def relative_to(self, other: "State") -> Relative:
         """Return these states less others."""
         return tuple(mine - theirs for mine, theirs in zip(self, other, strict=True))
 
@@ -45,7 +45,7 @@ class Detector:
 
     def span(self, own: State, intruder: State, begin_s: Any, end_s: Any) -> Span:
         """Return from when to when flights meet it."""
-        relative = own.less(intruder)
+        relative = own.relative_to(intruder)
         if self.volume is not None:
             vertical = own.up_m, own.climb_mps
             return detection_span(self.volume, relative, vertical, self.bounds, begin_s, end_s)
@@ -55,7 +55,7 @@ class Detector:
 
 def meets(span: Span, begin_s: Any, end_s: Any) -> BoolArray:
     """Tell whether a volume is met in part of the time that was looked at; never in none."""
-    result = surely_less(np.maximum(span.begin_s, begin_s), np.minimum(span.end_s, end_s))
+    result = is_surely_less(np.maximum(span.begin_s, begin_s), np.minimum(span.end_s, end_s))
     return np.asarray(result & (np.asarray(begin_s) < end_s))
 
 
@@ -64,4 +64,4 @@ def meets_at(span: Span, from_s: Any, begin_s: Any, end_s: Any) -> BoolArray:
     alone = np.asarray((begin_s == end_s) & (from_s == end_s))
     if not alone.any():
         return alone
-    return alone & ~surely_less(end_s, span.begin_s) & surely_less(end_s, span.end_s)
+    return alone & ~is_surely_less(end_s, span.begin_s) & is_surely_less(end_s, span.end_s)

@@ -38,7 +38,7 @@ def line_of_sight_errors(
     """
     mp = multiprecision()
     with mp.workdps(DIGITS):
-        here, there = _earth_centred(mp, *own), _earth_centred(mp, *other)
+        here, there = _to_earth_centred(mp, *own), _to_earth_centred(mp, *other)
         apart = [t - h for t, h in zip(there, here, strict=True)]
         body = _to_body(mp, _to_ned(mp, apart, own[0], own[1]), attitude)
         distance = mp.sqrt(sum(part * part for part in body))
@@ -59,7 +59,7 @@ def line_of_sight_errors(
         )
 
 
-def _earth_centred(mp: Any, lat_deg: float, lon_deg: float, alt_m: float) -> tuple[Any, ...]:
+def _to_earth_centred(mp: Any, lat_deg: float, lon_deg: float, alt_m: float) -> tuple[Any, ...]:
     flattening = 1 / mp.mpf("298.257223563")
     e2 = flattening * (2 - flattening)
     lat, lon = mp.radians(mp.mpf(float(lat_deg))), mp.radians(mp.mpf(float(lon_deg)))

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, not_negative, positive, unflatten
+from components.arguments.checks import broadcast_flat, check_not_negative, positive, unflatten
 from components.optical.detection import detection_probability
 
 __all__ = [
@@ -32,19 +32,19 @@ __all__ = [
 
 def target_share(area_m2: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
     """Return the share of the beam's disc that a target which shows an area fills."""
-    return _filled("area_m2", area_m2, range_m, divergence_rad, 2)
+    return _filled_beam_share("area_m2", area_m2, range_m, divergence_rad, 2)
 
 
 def wire_share(diameter_m: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
     """Return the share of the beam's disc that a wire through its middle fills: 4 d / (π θ R)."""
-    return _filled("diameter_m", diameter_m, range_m, divergence_rad, 1)
+    return _filled_beam_share("diameter_m", diameter_m, range_m, divergence_rad, 1)
 
 
-def _filled(
+def _filled_beam_share(
     name: str, size: ArrayLike, range_m: ArrayLike, divergence_rad: float, power: int
 ) -> Any:
     shape, (filled, distance) = broadcast_flat(
-        **{name: not_negative(name, size), "range_m": positive("range_m", range_m)}
+        **{name: check_not_negative(name, size), "range_m": positive("range_m", range_m)}
     )
     width_m = float(positive("divergence_rad", divergence_rad)) * distance
     return unflatten(np.minimum(filled / (0.25 * math.pi * width_m**power), 1.0), shape)
@@ -67,14 +67,14 @@ def laser_power_w(
     Direct-Detection LADAR Systems, SPIE 2010, chapter 1.
     """
     shape, (part, distance, bright) = broadcast_flat(
-        share=not_negative("share", share),
+        share=check_not_negative("share", share),
         range_m=positive("range_m", range_m),
-        reflectivity=not_negative("reflectivity", reflectivity),
+        reflectivity=check_not_negative("reflectivity", reflectivity),
     )
     sent_w = float(positive("peak_power_w", peak_power_w)) * float(
-        not_negative("efficiency", efficiency)
+        check_not_negative("efficiency", efficiency)
     )
-    depth = 2.0 * float(not_negative("extinction_per_m", extinction_per_m)) * distance
+    depth = 2.0 * float(check_not_negative("extinction_per_m", extinction_per_m)) * distance
     with np.errstate(under="ignore"):
         left = np.exp(-depth)
         collected = (0.5 * float(positive("aperture_m", aperture_m)) / distance) ** 2
@@ -92,8 +92,8 @@ def shots_on_target(
     by its thickness and the beam its length by π θ / 4.
     """
     shape, (target, beam, each) = broadcast_flat(
-        area_rad2=not_negative("area_rad2", area_rad2),
-        beam_area_rad2=not_negative("beam_area_rad2", beam_area_rad2),
+        area_rad2=check_not_negative("area_rad2", area_rad2),
+        beam_area_rad2=check_not_negative("beam_area_rad2", beam_area_rad2),
         spacing_rad2=positive("spacing_rad2", spacing_rad2),
     )
     return unflatten(np.maximum(target, beam) / each, shape)
@@ -115,7 +115,7 @@ def scan_detection_probability(
     from scipy.special import bdtrc
 
     shape, (ratio, mean) = broadcast_flat(
-        snr=not_negative("snr", snr), shots=not_negative("shots", shots)
+        snr=check_not_negative("snr", snr), shots=check_not_negative("shots", shots)
     )
     one = detection_probability(ratio, threshold, 1.0)
     whole = np.floor(mean)

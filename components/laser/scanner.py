@@ -18,7 +18,7 @@ from components.laser.link import (
     wire_share,
 )
 from components.optical.area_of_cells import area_of_cells
-from components.optical.detection import detection_probability, deviations_exceeded
+from components.optical.detection import detection_probability, deviations_of_exceedance
 from components.optical.weather_effects import obscuration
 from components.radar.beam import BeamSweep, SweepingSensor
 from components.radar.measurement import range_variance
@@ -90,7 +90,7 @@ class LaserParameters(RangeErrorParameters, SensorParameters):
     )
 
     @model_validator(mode="after")
-    def _edges_not_swapped(self) -> Self:
+    def _check_edges(self) -> Self:
         low, high = self.azimuth_deg
         if low > 0.0 > high and high - low + 360.0 > 180.0:
             raise ValueError(
@@ -101,7 +101,7 @@ class LaserParameters(RangeErrorParameters, SensorParameters):
         return self
 
     @model_validator(mode="after")
-    def _one_pulse_in_the_air(self) -> Self:
+    def _check_pulse_rate(self) -> Self:
         rate_hz = float(self.scan_rate_hz) * self.azimuth_shots * self.elevation_shots
         farthest_km = 299_792.458 / (2.0 * rate_hz)
         if self.range_km > farthest_km:
@@ -200,7 +200,7 @@ class ScanningLaser(SweepingSensor):
         super().__init__(name, parameters, context)
         self.divergence_rad = 1e-3 * parameters.divergence_mrad
         #: Amplitude that is detected, in standard deviations of the receiver's noise.
-        self.threshold = deviations_exceeded(parameters.false_alarm_probability)
+        self.threshold = deviations_of_exceedance(parameters.false_alarm_probability)
         width = sector_width_rad(*self.reach.azimuth_rad)
         height = self.reach.elevation_rad[1] - self.reach.elevation_rad[0]
         self._spacing_rad2 = width / parameters.azimuth_shots * height / parameters.elevation_shots
@@ -280,7 +280,7 @@ class ScanningLaser(SweepingSensor):
         strength = np.maximum(strength, self.threshold)
         snr_db = 20.0 * np.log10(strength)
         extras: dict[str, AnyArray] = {"snr_db": snr_db}
-        if self._says_looks:
+        if self._is_asked_for_looks:
             extras["detection_probability"] = probability
         above_db = snr_db - 20.0 * math.log10(self.threshold)
         return Look(detected, above_db, extras, {"amplitude": strength})

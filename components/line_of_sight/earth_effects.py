@@ -10,9 +10,9 @@ import numpy as np
 from components.environment.tables import Terrain
 from components.geometry import POSITION_FIELDS, SeenFromOwnship, sensor_angles
 from components.terrain.rays import (
-    behind_terrain,
-    behind_the_limb,
     bent_elevation_rad,
+    is_behind_limb,
+    is_behind_terrain,
     miss_bound_m,
 )
 from dsa_des.arrays.types import BoolArray
@@ -59,8 +59,8 @@ class Limb(Effect[Hides]):
         """Return what tells which targets are behind the limb."""
         terrain = terrain_section(block)
         surface_m = terrain.height_m or 0.0
-        return _of_present(
-            lambda a, b: behind_the_limb(a, b, surface_m=surface_m, refraction=terrain.refraction)
+        return _ask_for_present(
+            lambda a, b: is_behind_limb(a, b, surface_m=surface_m, refraction=terrain.refraction)
         )
 
 
@@ -88,8 +88,8 @@ class Mountains(Effect[Hides]):
         terrain = terrain_section(block)
         assert terrain.raster is not None
         raster = terrain.raster.raster
-        return _of_present(
-            lambda a, b: behind_terrain(
+        return _ask_for_present(
+            lambda a, b: is_behind_terrain(
                 a, b, raster, offset_m=terrain.raster_offset_m, refraction=terrain.refraction
             )
         )
@@ -130,7 +130,7 @@ class Refraction(Effect[Bends]):
 EARTH_EFFECTS = (Limb(), Mountains(), Refraction())
 
 
-def _of_present(hidden_of: Callable[[Any, Any], BoolArray]) -> Hides:
+def _ask_for_present(hidden_of: Callable[[Any, Any], BoolArray]) -> Hides:
     """Return what asks of the targets that are there only; the others count as not hidden."""
 
     def hides(own: Any, other: Any, present: BoolArray) -> BoolArray:

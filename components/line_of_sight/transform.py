@@ -26,10 +26,10 @@ from components.messages.targets import RelativeTargets, TrafficStates
 from components.navigation.errors import OWNSHIP, NavigationErrors
 from components.sensor.ladder_values import (
     angle_apart_mrad,
-    over_roster,
-    wrapped_apart_mrad,
+    angular_distance_mrad,
+    spread_over_roster,
 )
-from dsa_des.arrays.column_values import one_row, seen_once
+from dsa_des.arrays.column_values import constant_if_equal, one_row
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable, Verified
@@ -42,8 +42,8 @@ _MRAD_PER_DEG = 1e3 * np.pi / 180.0
 #: little, so costs are weighed against the angle between the lines of sight.
 QUANTITIES = (
     Quantity("direction", "mrad", angle_apart_mrad, "angle_deg", _MRAD_PER_DEG),
-    Quantity("azimuth", "mrad", wrapped_apart_mrad),
-    Quantity("elevation", "mrad", wrapped_apart_mrad),
+    Quantity("azimuth", "mrad", angular_distance_mrad),
+    Quantity("elevation", "mrad", angular_distance_mrad),
     Quantity("range", "m", tolerance="range_m"),
 )
 
@@ -52,12 +52,12 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     """Return the lines of sight that a transform gives, in body axes."""
     seen: Any = block.run(wake)
     return {
-        "direction": over_roster(
+        "direction": spread_over_roster(
             seen, unit_vectors(seen.body_azimuth_rad, seen.body_elevation_rad)
         ),
-        "azimuth": over_roster(seen, seen.body_azimuth_rad),
-        "elevation": over_roster(seen, seen.body_elevation_rad),
-        "range": over_roster(seen, seen.range_m),
+        "azimuth": spread_over_roster(seen, seen.body_azimuth_rad),
+        "elevation": spread_over_roster(seen, seen.body_elevation_rad),
+        "range": spread_over_roster(seen, seen.range_m),
     }
 
 
@@ -220,7 +220,7 @@ class Transform(Component):
         states = wake["states"]
         if states is None:
             return None
-        own = _beside_targets(states)
+        own = _broadcast_ownship(states)
         return RelativeTargets(
             tick=wake.ticks,
             state_tick=states.tick,
@@ -230,23 +230,29 @@ class Transform(Component):
             roster=states.roster,
             columns=states.columns,
             culled=states.culled,
-            believed={name: seen_once(v) for name, v in self._believed(states).items()},
+            believed={
+                name: constant_if_equal(v) for name, v in self._believed_columns(states).items()
+            },
             own_attitude={name: getattr(states, f"own_{name}") for name in POSE_FIELDS[3:]},
-            revisit=None if states.flights is None else states.flights.seen_by(self._revisited),
-            **self._as_seen(own, states, states.present),
+            revisit=None
+            if states.flights is None
+            else states.flights.seen_by(self._columns_at_other_instants),
+            **self._target_columns(own, states, states.present),
         )
 
-    def _as_seen(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
+    def _target_columns(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
         """Return the fields of `RelativeTargets` that are per row and target."""
         rows, width = present.shape
         step = max(1, CELLS_AT_ONCE // max(1, width))
         if rows <= step:
-            seen = self._seen(own, other, present)
+            seen = self._line_of_sight_columns(own, other, present)
         else:
             seen = {}
             for first in range(0, rows, step):
                 block = slice(first, first + step)
-                part = self._seen(_block(own, block), _block(other, block), present[block])
+                part = self._line_of_sight_columns(
+                    _block(own, block), _block(other, block), present[block]
+                )
                 seen = seen or {n: np.empty(present.shape, v.dtype) for n, v in part.items()}
                 for name, values in part.items():
                     seen[name][block] = values
@@ -258,7 +264,9 @@ class Transform(Component):
             "present": present,
         }
 
-    def _seen(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
+    def _line_of_sight_columns(
+        self, own: Any, other: Any, present: BoolArray
+    ) -> dict[str, AnyArray]:
         seen = self._line_of_sight.from_ownship(own, other)
         for bends in self._bending:
             seen = bends(own, seen, self._line_of_sight.attitude)
@@ -274,16 +282,16 @@ class Transform(Component):
             )
         return fields
 
-    def _revisited(self, own: Any, other: Any) -> dict[str, Any]:
+    def _columns_at_other_instants(self, own: Any, other: Any) -> dict[str, Any]:
         """Return the fields of the rows at other instants, and where all aircraft are then."""
-        seen = self._as_seen(own, other, own.present & other.present)
+        seen = self._target_columns(own, other, own.present & other.present)
         return {
             **seen,
             "target": {name: getattr(other, name) for name in POSITION_FIELDS},
             "own": {name: getattr(own, name) for name in (*POSE_FIELDS, "present")},
         }
 
-    def _believed(self, states: TrafficStates) -> dict[str, FloatArray]:
+    def _believed_columns(self, states: TrafficStates) -> dict[str, FloatArray]:
         """Return what the ownship believes of itself."""
         for belief in self._beliefs:
             return belief(states)
@@ -294,7 +302,7 @@ def _block(state: Any, rows: slice) -> SimpleNamespace:
     return SimpleNamespace(**{name: getattr(state, name)[rows] for name in POSE_FIELDS})
 
 
-def _beside_targets(states: TrafficStates) -> SimpleNamespace:
+def _broadcast_ownship(states: TrafficStates) -> SimpleNamespace:
     """Return the ownship's position and attitude, broadcastable to the targets'."""
     own = [getattr(states, f"own_{name}") for name in POSE_FIELDS]
     if len(states) > 1:

@@ -103,8 +103,8 @@ class AlertsOffered(NamedTuple):
     period_s: float  # Between its scans
 
 
-def never_reached(key: str, level: int, producers: Iterable[Producer]) -> list[str]:
-    """Say that no alert reaches the level of a key, of who is fed by such producers."""
+def note_unreached_level(key: str, level: int, producers: Iterable[Producer]) -> list[str]:
+    """Return a note where the producers' alerts never reach the level that a key asks for."""
     offered = [p.offer.levels for p in producers if isinstance(p.offer, AlertsOffered)]
     if not offered or level <= max(offered):
         return []

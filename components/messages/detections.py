@@ -25,7 +25,7 @@ from components.messages.columns import (
 from components.messages.looks import look_columns
 from components.messages.reach import Reach
 from components.messages.targets import RelativeTargets
-from dsa_des.arrays.column_values import picked
+from dsa_des.arrays.column_values import take_rows
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Hook
 from dsa_des.block.message import (
@@ -215,7 +215,7 @@ _OFTEN_S = 2.0
 def promises_of_looks(
     period_s: float, promises: Iterable[tuple[float, float]] = ()
 ) -> tuple[tuple[float, float], ...]:
-    """Return what a sensor promises (`SensorOffer`) that looks so often, s.
+    """Return the promises (`SensorOffer`) of a sensor with this look interval, s.
 
     `promises` are those that it makes whatever its looks. Of a sensor that looks often nothing is
     said of its looks, so that replicas may differ in their rates.
@@ -384,7 +384,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         if self.own_of_entries is not None:
             return self.own_of_entries
         row, pose = self.row_of_entries, {name: getattr(self, name) for name in POSE}
-        return {name: picked(v, row) for name, v in pose.items() if v is not None}
+        return {name: take_rows(v, row) for name, v in pose.items() if v is not None}
 
     def velocity_columns(self) -> dict[str, FloatArray] | None:
         """Return how the ownship moved at each entry, by column; None where none is known."""

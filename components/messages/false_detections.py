@@ -14,7 +14,7 @@ from dsa_des.arrays.entries import offsets_of
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 
-def in_measured_order(detections: Detections) -> Detections:
+def sort_by_measurement(detections: Detections) -> Detections:
     """Return a sensor's report with the detections of each scan by what was measured of them.
 
     Nearest first, then by azimuth, elevation and confidence: the order of a roster would tell who
@@ -24,7 +24,7 @@ def in_measured_order(detections: Detections) -> Detections:
     measured = (
         detections.confidence, detections.elevation_rad, detections.azimuth_rad, detections.range_m
     )  # fmt: skip
-    return detections.reordered(np.lexsort((*measured, row)))
+    return detections.reorder(np.lexsort((*measured, row)))
 
 
 def add_false_detections(
@@ -101,6 +101,6 @@ def true_entries(message: AnyDetections) -> AnyDetections:
     if np.count_nonzero(message.target < 0) == 0:
         return message
     kept = np.flatnonzero(message.target >= 0)
-    true = message.reordered(kept)
+    true = message.reorder(kept)
     true.offsets = offsets_of(message.row_of_entries[kept], len(message))
     return true

@@ -37,7 +37,8 @@ class AllFlights(Protocol):
         ahead_s: FloatArray | float,
         viewer: int,
     ) -> tuple[TrajectoryState, TrajectoryState]:
-        """Return states of who looks, in some runs, and of the targets (`columns` of its roster).
+        """Return states of the viewing platform in some runs, and of its targets (`columns` of its
+        roster).
 
         Times are (rows, 1) or (rows, columns), and so are the states of who looks; `known` (...,
         platforms) is how many manoeuvres of each count. `ahead_s` is how long after what is known
@@ -96,7 +97,7 @@ class KnownFlights:
         run, known = self.run[row][np.newaxis], self.known[row][np.newaxis]
         return _flat(self._states(run, known, column, time_s[np.newaxis], ahead_s[np.newaxis]))
 
-    def own_at(self, row: IntArray, time_s: FloatArray) -> TrajectoryState:
+    def ownship_states(self, row: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return the states of who looks as some rows (n,) know it, at a time (n,) of each."""
         return self.flights.own_states(self.run[row], self.known[row], time_s, self._viewer)
 
@@ -120,17 +121,17 @@ class KnownFlights:
 
     def seen_from(self, viewer: int) -> KnownFlights:
         """Return the same for who looks from a target."""
-        return self._with(self.run, self.known, viewer=viewer)
+        return self._replace(self.run, self.known, viewer=viewer)
 
     def seen_by(self, seen: Callable[..., Mapping[str, AnyArray]]) -> KnownFlights:
         """Return the same for who looks at the states through `seen`, which takes both."""
-        return self._with(self.run, self.known, seen=(*self._seen, seen))
+        return self._replace(self.run, self.known, seen=(*self._seen, seen))
 
     def take_rows(self, rows: slice | IntArray) -> KnownFlights:
         """Return the flights of some rows."""
-        return self._with(self.run[rows], self.known[rows])
+        return self._replace(self.run[rows], self.known[rows])
 
-    def _with(self, run: IntArray, known: IntArray, **changed: Any) -> KnownFlights:
+    def _replace(self, run: IntArray, known: IntArray, **changed: Any) -> KnownFlights:
         how = {"seen": self._seen, "viewer": self._viewer, **changed}
         return KnownFlights(self.flights, run, known, **how)
 
@@ -145,7 +146,7 @@ class KnownFlights:
         run, known = (
             np.concatenate([getattr(part, name) for part in parts]) for name in ("run", "known")
         )
-        return newest._with(run, known)
+        return newest._replace(run, known)
 
 
 def _flat(seen: Mapping[str, Any]) -> Mapping[str, AnyArray]:

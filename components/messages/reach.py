@@ -166,7 +166,7 @@ class Decision:
     reason: ReasonArray  # (scans, targets)
     count: int  # Rows of the message
 
-    def at(self, rows: IntArray) -> ReasonArray | None:
+    def reasons_at(self, rows: IntArray) -> ReasonArray | None:
         """Return the reasons at some message rows; None where the sensor does not scan at one."""
         own = self.rows
         if rows is own or (len(rows) == len(own) and bool((rows == own).all())):
@@ -187,7 +187,7 @@ class Decision:
         kept = np.flatnonzero(scan >= 0)
         return Decision(kept, self.reason[scan[kept]], len(scan))
 
-    def widened(self, columns: IntArray, width: int) -> "Decision":
+    def widen(self, columns: IntArray, width: int) -> "Decision":
         """Return the decision over `width` targets, ours in these `columns`, the others absent."""
         reason = np.full((len(self.reason), width), ABSENT, dtype=np.uint8)
         reason[:, columns] = self.reason

@@ -21,7 +21,7 @@ STALE_S = 30.0
 HELD = STATUSES[CONFIRMED], STATUSES[COASTED]
 
 
-def held(status: Text) -> BoolArray:
+def is_held(status: Text) -> BoolArray:
     """Return which rows of a column of statuses are of confirmed or coasted tracks."""
     return np.isin(status.codes, [k for k, name in enumerate(status.names) if name in HELD])
 

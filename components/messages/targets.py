@@ -21,7 +21,7 @@ from components.geometry import (
 from components.messages.columns import OWN_NED, TURNED, WGS84
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import Decision
-from dsa_des.arrays.run_ticks import says_no_runs
+from dsa_des.arrays.run_ticks import is_single_run
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Column, Columns, Message, Text, per_row, static
 
@@ -78,7 +78,7 @@ def truth_columns(states: Any) -> Columns:
     columns: Columns = {
         name: np.concatenate([part[name] for part in parts]) for name in ("tick", *_NUMBERS)
     }
-    if not says_no_runs(states.run):
+    if not is_single_run(states.run):
         counts = np.concatenate([part["counts"] for part in parts])
         columns["replica"] = np.repeat(states.run, counts)
     who = np.concatenate([part["who"] for part in parts])
@@ -91,7 +91,7 @@ def _part(flights: Any, tick: IntArray, time_s: FloatArray, count: int) -> dict[
     # All three instants are asked for at once.
     times_s = np.concatenate([time_s, time_s + STEP_S, time_s - STEP_S])
     asked = flights.take_rows(np.tile(np.arange(rows), 3))(columns, times_s[:, np.newaxis])
-    states = _together(asked)
+    states = _with_ownship(asked)
     state, after, before = (
         {name: values[first : first + rows] for name, values in states.items()}
         for first in (0, rows, 2 * rows)
@@ -127,7 +127,7 @@ def _velocity(
             (way_after, there_after, STEP_S),
             (way_before, there_before, -STEP_S),
         ):
-            far = _together(part(columns, (time_s[rows] + 2.0 * step_s)[:, np.newaxis]))
+            far = _with_ownship(part(columns, (time_s[rows] + 2.0 * step_s)[:, np.newaxis]))
             slope = (4.0 * near[:, rows] - _way(here, far)) / (2.0 * step_s)
             fits = one_sided[rows] & there[rows] & far["present"]
             velocity[:, rows] = np.where(fits, slope, velocity[:, rows])
@@ -142,7 +142,7 @@ def _way(here: _State, there: _State) -> FloatArray:
     return np.stack(line_of_sight_ned(*ends, validate=False))
 
 
-def _together(states: Any) -> dict[str, Any]:
+def _with_ownship(states: Any) -> dict[str, Any]:
     """Return the ownship's states (rows, 1) and the targets' (rows, n) side by side."""
     own, others = states
     return {
@@ -251,7 +251,7 @@ class TrafficStates(Message):
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
         """Return the rows of all parts, over the targets of any of them."""
-        return super().concatenate(over_same_targets(parts))
+        return super().concatenate(widen_to_union(parts))
 
 
 @dataclass(eq=False)
@@ -325,7 +325,7 @@ class RelativeTargets(Message):
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
         """Return the rows of all parts, over the targets of any of them."""
-        return super().concatenate(over_same_targets(parts))
+        return super().concatenate(widen_to_union(parts))
 
 
 @dataclass(eq=False)
@@ -346,16 +346,16 @@ def check_columns(message: Any) -> None:
             )
 
 
-def over_same_targets(parts: Sequence[Any]) -> list[Any]:
+def widen_to_union(parts: Sequence[Any]) -> list[Any]:
     """Return messages widened to the union of their targets; added ones are not present."""
     first = parts[0].columns
     if all(part.columns is first or np.array_equal(part.columns, first) for part in parts):
         return list(parts)
     columns = np.unique(np.concatenate([part.columns for part in parts]))
-    return [_widened(part, columns) for part in parts]
+    return [_widen(part, columns) for part in parts]
 
 
-def _widened(part: Any, columns: IntArray) -> Any:
+def _widen(part: Any, columns: IntArray) -> Any:
     index = np.searchsorted(columns, part.columns)
     result = copy(part)
 
@@ -371,7 +371,7 @@ def _widened(part: Any, columns: IntArray) -> Any:
         result.present_to = {name: widened(there) for name, there in part.present_to.items()}
     if isinstance(part, GatedTargets):
         result.decisions = {
-            sensor: decision.widened(index, len(columns))
+            sensor: decision.widen(index, len(columns))
             for sensor, decision in part.decisions.items()
         }
     result.columns = columns
@@ -387,7 +387,7 @@ def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) ->
     if targets.revisit is None or not len(targets.roster) or not len(row):
         return np.full((3, len(row)), np.nan)
     at_s = np.concatenate([time_s, time_s - _OWN_STEP_S, time_s + _OWN_STEP_S])
-    own = targets.revisit.own_at(np.tile(row, 3), at_s)
+    own = targets.revisit.ownship_states(np.tile(row, 3), at_s)
     place = [getattr(own, name) for name in POSITION_FIELDS]
     here = [np.tile(values[: len(row)], 2) for values in place]
     there = own.present[len(row) :]

@@ -59,7 +59,7 @@ class Tracks(MeasuredLine, Message):
         """Return a message without tracks; the scene's table must be empty."""
         if values:
             raise ValueError("tracks before the first message can only be an empty table, {}")
-        return cls.empty(roster=Roster.of([]), sensors=(), measured_tick=None)
+        return cls.empty(roster=Roster.from_pairs([]), sensors=(), measured_tick=None)
 
 
 @dataclass(eq=False)

@@ -15,12 +15,12 @@ START, END = "the start", "the end of the run"
 NEVER = "never"
 
 
-def in_scan(time: FloatArray | int, scan: FloatArray | int) -> BoolArray:
+def is_in_scan(time: FloatArray | int, scan: FloatArray | int) -> BoolArray:
     """Return whether a time (NaN for none) is that of the first (last) scan that can tell."""
     return np.equal(time, scan)
 
 
-def said(at: AnyArray, values: FloatArray | None = None) -> AnyArray:
+def censoring_text(at: AnyArray, values: FloatArray | None = None) -> AnyArray:
     """Return what a study's column says of values: ``at the start``, ``never`` or nothing.
 
     `at` is where each is cut off, empty where it is not; values are NaN where it did not happen, if

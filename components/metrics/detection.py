@@ -12,21 +12,21 @@ from components.metrics.rows import (
     SCANS,
     SensorMetricParameters,
     TargetMetric,
-    at_start,
-    columns_at,
+    column_at_rows,
     earliest,
     first_of_targets,
+    is_at_start,
     is_named,
-    of_target,
-    picked,
+    is_of_target,
     scan_time_s,
     sensors_of,
     start_or_never,
-    taken,
+    values_of_target,
+    values_of_targets,
     with_trials,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.replicas.times_out import may_be_out, times_out
+from dsa_des.replicas.times_out import blocks_that_may_be_out, times_out
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import (
     EVENT,
@@ -95,14 +95,18 @@ class FirstDetection(TargetMetric):
             values[f"detected.{name}"] = (~np.isnan(time_s)).astype(float)
             values[f"first_detection_time_s.{name}"] = time_s
             values[f"first_detection_range_m.{name}"] = range_m
-            cut = self._fused_at_start(group) if name == FUSED else at_start(group, name, time_s)
+            cut = (
+                self._is_fused_at_start(group)
+                if name == FUSED
+                else is_at_start(group, name, time_s)
+            )
             values[f"first_detection_cut_off.{name}"] = start_or_never(cut, time_s)
         return values
 
-    def _fused_at_start(self, group: Group) -> BoolArray:
+    def _is_fused_at_start(self, group: Group) -> BoolArray:
         """Return whether a replica's first fused report is of what a sensor's first scan saw."""
         columns: Any = group.tables[FUSED]
-        rows = np.flatnonzero(of_target(columns, self.p.target))
+        rows = np.flatnonzero(is_of_target(columns, self.p.target))
         first = first_row(columns, rows, len(group))
         sensors = columns["sensors"]
         code = np.where(first >= 0, sensors.codes[first], -1) if len(rows) else first
@@ -110,7 +114,7 @@ class FirstDetection(TargetMetric):
         for number, names in enumerate(sensors.names):
             for name in names.split("+"):
                 # Lateness on the way may vary, but not by a whole scan.
-                seen_s = taken(columns, "time_s", first) - self.delay_s.get(name, 0.0)
+                seen_s = column_at_rows(columns, "time_s", first) - self.delay_s.get(name, 0.0)
                 begun = ~np.isnan(scan_time_s(group, name, 1))
                 again_s = scan_time_s(group, name, 2)
                 result |= (code == number) & begun & ~(seen_s >= again_s)
@@ -123,19 +127,22 @@ def first_report(group: Group, name: str, target: str | None) -> list[FloatArray
     Of several targets reported at that instant the nearest counts.
     """
     columns = group.tables[FUSED if name == FUSED else "detections"]
-    rows = of_target(columns, target)
+    rows = is_of_target(columns, target)
     if name != FUSED:
         rows &= is_named(columns["block"], name)
     first = first_row(columns, np.flatnonzero(rows), len(group))
-    return [taken(columns, "time_s", first), taken(columns, "true_range_m", first)]
+    return [
+        column_at_rows(columns, "time_s", first),
+        column_at_rows(columns, "true_range_m", first),
+    ]
 
 
 def first_row(columns: Any, rows: IntArray, count: int) -> IntArray:
     """Return the row of each replica's first report of any target, -1 where it has none."""
     each = first_of_targets(columns, rows, count)
-    when_s, range_m = (taken(columns, name, each) for name in ("time_s", "true_range_m"))
+    when_s, range_m = (column_at_rows(columns, name, each) for name in ("time_s", "true_range_m"))
     which = earliest(when_s, range_m)
-    return np.where(which < 0, -1, picked(each, which))
+    return np.where(which < 0, -1, values_of_target(each, which))
 
 
 class DetectionShare(TargetMetric):
@@ -157,7 +164,7 @@ class DetectionShare(TargetMetric):
         """Return one share per sensor, and how long each that may be out was."""
         meaning = "detections per look at a target in reach"
         shares = [Result(f"detection_share.{name}", SHARE, meaning) for name in self.names]
-        out = sorted(set(self.names).intersection(may_be_out(self.scene)))
+        out = sorted(set(self.names).intersection(blocks_that_may_be_out(self.scene)))
         meaning = "share of the run in which it was out"
         return [*shares, *(Result(f"out_share.{name}", FRACTION, meaning) for name in out)]
 
@@ -167,7 +174,7 @@ class DetectionShare(TargetMetric):
         values: dict[str, FloatArray] = {}
         for name in self.names:
             looks = is_named(scans["block"], name)
-            hits = is_named(detections["block"], name) & of_target(detections, None)
+            hits = is_named(detections["block"], name) & is_of_target(detections, None)
             rows: Any = scans
             trials = np.bincount(
                 rows["replica"][looks], weights=rows["evaluated"][looks], minlength=len(group)
@@ -246,7 +253,7 @@ class Declaration(TargetMetric):
         """Return the first declaration of every replica."""
         values: dict[str, AnyArray] = {}
         for name, each in declarations(group, self.p, self.sensors).items():
-            first = each.of(earliest(each.time_s, each.range_m))
+            first = each.select_target(earliest(each.time_s, each.range_m))
             values[f"declared.{name}"] = (~np.isnan(first.time_s)).astype(float)
             values[f"declaration_time_s.{name}"] = first.time_s
             values[f"declaration_range_m.{name}"] = first.range_m
@@ -261,7 +268,7 @@ class Declaration(TargetMetric):
         for name in self.sensors:
             parameters = scene.blocks[name].parameters
             clock = scene.blocks[name].cls.clock_of(parameters)
-            m = needed(self.p.m, scene, name)
+            m = detections_needed(self.p.m, scene, name)
             if clock is not None:
                 values[f"declaration_delay_s.{name}"] = float(clock.period_s * (m - 1))
         return values
@@ -280,9 +287,9 @@ class Declared(NamedTuple):
     seen_s: FloatArray
     seen_at_start: BoolArray
 
-    def of(self, target: IntArray) -> "Declared":
+    def select_target(self, target: IntArray) -> "Declared":
         """Return what is known of one target of each replica (index, -1 for none)."""
-        return Declared(*(picked(values, target) for values in self))
+        return Declared(*(values_of_target(values, target) for values in self))
 
 
 def declarations(
@@ -296,14 +303,14 @@ def declarations(
     Targets are those named, or those of the recorded column in its order.
     """
     key = ("declarations", parameters.m, parameters.n, parameters.target, tuple(sensors))
-    known = group.once(key, lambda: _declarations(group, parameters, sensors))
+    known = group.cached(key, lambda: _declarations(group, parameters, sensors))
     if targets is None:
         return known
     columns: Any = group.tables["detections"]
     index = {name: k for k, name in enumerate(columns["target"].names)}
     wanted = np.array([index.get(name, -1) for name in targets], dtype=np.int64)
     return {
-        name: Declared(*(columns_at(values, wanted) for values in each))
+        name: Declared(*(values_of_targets(values, wanted) for values in each))
         for name, each in known.items()
     }
 
@@ -312,7 +319,7 @@ def _declarations(
     group: Group, parameters: DeclarationParameters, sensors: list[str]
 ) -> dict[str, Declared]:
     columns: Any = group.tables["detections"]
-    known = of_target(columns, parameters.target)
+    known = is_of_target(columns, parameters.target)
     count = len(group)
     result: dict[str, Declared] = {}
     for name in sensors:
@@ -328,22 +335,22 @@ def _declarations(
                 parameters.n,
             )
         first = first_of_targets(columns, rows[declared], count)
-        time_s = taken(columns, "time_s", first)
-        seen_s = taken(columns, "time_s", first_of_targets(columns, rows, count))
-        scans = needed(parameters.m, group.scene, name)
+        time_s = column_at_rows(columns, "time_s", first)
+        seen_s = column_at_rows(columns, "time_s", first_of_targets(columns, rows, count))
+        scans = detections_needed(parameters.m, group.scene, name)
         result[name] = Declared(
             time_s,
-            taken(columns, "true_range_m", first),
-            at_start(group, name, time_s, scans),
+            column_at_rows(columns, "true_range_m", first),
+            is_at_start(group, name, time_s, scans),
             seen_s,
-            at_start(group, name, seen_s),
+            is_at_start(group, name, seen_s),
         )
     if result:
         result[ANY] = _earliest(list(result.values()))
     return result
 
 
-def needed(m: int | None, scene: Scene, name: str) -> int:
+def detections_needed(m: int | None, scene: Scene, name: str) -> int:
     """Return how many detections declare: `m`, or what the sensor's own rule says."""
     return int(m or getattr(scene.blocks[name].parameters, "declare_m", None) or 1)
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from components.arguments.units import FOOT_M
-from components.metrics.censored import END, START, in_scan, said
+from components.metrics.censored import END, START, censoring_text, is_in_scan
 from components.metrics.detection import ANY, DECLARED, DeclarationParameters, declarations
 from components.metrics.flown_flights import FlownMetric, each_alone
 from components.metrics.losses import closest, losses_s
@@ -23,13 +23,13 @@ from components.metrics.rows import (
     TargetParameters,
     earliest,
     is_named,
-    picked,
     sensors_of,
+    values_of_target,
 )
 from components.metrics.separation import RelativeFlight, traffic_block
 from components.well_clear.volume import PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
-from dsa_des.replicas.times_out import may_be_out, out_between, times_out
+from dsa_des.replicas.times_out import blocks_that_may_be_out, out_between, times_out
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, RATIO, Group, RatioOf, Result, recorded_by
 
@@ -150,22 +150,24 @@ class ClosestApproach(_Encounter):
         """Return all of it for every replica."""
         names, each = self.of_each_flight(group, each_alone(_closest), to_the_end=True)
         nearest = earliest(each[0], each[0])
-        distance, time_s = picked(each[0], nearest), picked(each[1], nearest)
-        code = np.where(nearest < 0, 0.0, picked(each[2], nearest))
+        distance, time_s = values_of_target(each[0], nearest), values_of_target(each[1], nearest)
+        code = np.where(nearest < 0, 0.0, values_of_target(each[2], nearest))
         at = np.array([*_ENDS, _EARLY_END])[code.astype(int)]
         at[(at == END) & group.ended_early] = _EARLY_END
         values: dict[str, AnyArray] = {
             "closest_approach_m": distance,
             "closest_approach_time_s": time_s,
-            _CUT_OFF: said(at, distance),
+            _CUT_OFF: censoring_text(at, distance),
         }
         for name, known in declarations(group, self.p, self.sensors, names).items():
-            first = known.of(nearest)
+            first = known.select_target(nearest)
             parts = ((first.seen_s, first.seen_at_start), (first.time_s, first.at_start))
             for what, (when_s, cut) in zip(_BEFORE, parts, strict=True):
                 value = time_s - when_s
                 values[f"{what}_to_closest_s.{name}"] = value
-                values[f"{what}_to_closest_cut_off.{name}"] = said(np.where(cut, START, at), value)
+                values[f"{what}_to_closest_cut_off.{name}"] = censoring_text(
+                    np.where(cut, START, at), value
+                )
         return values
 
 
@@ -210,33 +212,35 @@ class WellClear(_Encounter):
         """Return all of it for every replica."""
         names, each = self.of_each_flight(group, self.p.losses_s, to_the_end=True)
         lost_s, collision_s, begun_s = each
-        lost_at_start = in_scan(lost_s, begun_s)
+        lost_at_start = is_in_scan(lost_s, begun_s)
         values: dict[str, AnyArray] = {
             "well_clear_lost": (~np.isnan(lost_s)).any(axis=1).astype(float),
             "nmac": (~np.isnan(collision_s)).any(axis=1).astype(float),
-            "well_clear_loss_time_s": _least(lost_s),
-            _LOSS_CUT_OFF: said(np.where(lost_at_start.any(axis=1), START, "")),
+            "well_clear_loss_time_s": _least_over_time(lost_s),
+            _LOSS_CUT_OFF: censoring_text(np.where(lost_at_start.any(axis=1), START, "")),
         }
         for name, first in declarations(group, self.p, self.sensors, names).items():
             warning_s = lost_s - first.time_s
-            worst = _least(warning_s, ~np.isnan(lost_s))
+            worst = _least_over_time(warning_s, ~np.isnan(lost_s))
             at_start = (first.at_start | lost_at_start) & (warning_s == worst[:, np.newaxis])
             values[f"warning_time_s.{name}"] = worst
-            values[f"warning_cut_off.{name}"] = said(np.where(at_start.any(axis=1), START, ""))
+            values[f"warning_cut_off.{name}"] = censoring_text(
+                np.where(at_start.any(axis=1), START, "")
+            )
         return values
 
 
-def _behind(scene: Scene, block: str) -> list[str]:
+def _blocks_before(scene: Scene, block: str) -> list[str]:
     """Return which blocks may be out of those that a block hears, itself among them.
 
     What steers the traffic is not: no alert is made of it.
     """
     graph = scene.graph.copy()
     graph.remove_edges_from(list(graph.in_edges(traffic_block(scene).name)))
-    return sorted({block, *nx.ancestors(graph, block)}.intersection(may_be_out(scene)))
+    return sorted({block, *nx.ancestors(graph, block)}.intersection(blocks_that_may_be_out(scene)))
 
 
-def _least(values: FloatArray, counts: BoolArray | None = None) -> FloatArray:
+def _least_over_time(values: FloatArray, counts: BoolArray | None = None) -> FloatArray:
     """Return the least value of each replica's targets (replicas, targets); NaN without any.
 
     Of those that count it is NaN if one of them has none.
@@ -308,7 +312,7 @@ class AlertTimes(FlownMetric):
         self._as_flown = parameters.steered or all(w.target != traffic for w in scene.wires)
         self._blocks = self.on_platform(recorded_by(scene, "alerts"))
         #: Which blocks may be out behind each of them that has any.
-        self._behind = {name: of for name in self._blocks if (of := _behind(scene, name))}
+        self._behind = {name: of for name in self._blocks if (of := _blocks_before(scene, name))}
 
     def results(self) -> list[Result]:
         """Return times and events of each alerting block."""
@@ -356,10 +360,12 @@ class AlertTimes(FlownMetric):
             lead_s = np.where(before, lost_s - first_s, np.nan)
             missed = lost & ~before
             range_m = self.ranges_m(group, first_s, to_the_end=self._as_flown)
-            values[f"first_alert_time_s.{name}"] = _least(first_s)
-            values[f"first_alert_range_m.{name}"] = picked(range_m, earliest(first_s, range_m))
-            values[f"alert_to_loss_s.{name}"] = _least(lead_s, lost)
-            values[f"alert_to_nmac_s.{name}"] = _least(nmac_s - first_s, met)
+            values[f"first_alert_time_s.{name}"] = _least_over_time(first_s)
+            values[f"first_alert_range_m.{name}"] = values_of_target(
+                range_m, earliest(first_s, range_m)
+            )
+            values[f"alert_to_loss_s.{name}"] = _least_over_time(lead_s, lost)
+            values[f"alert_to_nmac_s.{name}"] = _least_over_time(nmac_s - first_s, met)
             sudden = alerted & (first_s - below_s < self.p.surprise_s) & (self.p.level > 1)
             for what, event in {
                 "missed": missed,
@@ -369,7 +375,7 @@ class AlertTimes(FlownMetric):
             }.items():
                 values[f"alert_{what}.{name}"] = event.any(axis=1).astype(float)
             if name in self._behind:
-                out = group.once(
+                out = group.cached(
                     times_out, lambda: times_out(group.scene, group.replicas, group.duration_s)
                 )
                 due = out_between(out, self._behind[name], lost_s - self.p.late_s, lost_s)

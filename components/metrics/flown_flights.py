@@ -67,7 +67,7 @@ def flown_as_steered(own: Sequence[Any], told: Sequence[Told]) -> list[SteeredFl
     number = np.repeat(np.arange(len(told)), [len(one.came_s) for one in told])
     time_s, given = (np.concatenate(parts) for parts in list(zip(*told, strict=True))[1::2])
     for one in turns(number):  # the first of each aircraft, then the next
-        flights = flights.steered(number[one], time_s[one], given[one])
+        flights = flights.add_manoeuvres(number[one], time_s[one], given[one])
     return list(flights)
 
 
@@ -115,16 +115,18 @@ class FlownMetric(TargetMetric):
             self.tables = {**self.tables, "manoeuvres": ("block", "time_s", *_COLUMNS)}
 
     def flights_seen(self, group: Group, number: int) -> list[Any]:
-        """Return the flights of who looks in a replica, as steered, and then of all it may see."""
+        """Return the flight of the viewing platform in a replica, as steered, then of all it may
+        see.
+        """
         source = traffic_of(group.scenes[number])[0]
         own, *others = source.seen_from(source.platforms()[self.viewer + 1])
-        told = self._told(group).get(number, _NOTHING)
+        told = self._received_manoeuvres(group).get(number, _NOTHING)
         places = [place for place in range(len(source.targets)) if place not in source.unseen]
         places = sorted({*places, self.viewer} - {-1})
         flights = [own, *others]
         of_each = [self.viewer, *(-1 if place == self.viewer else place for place in places)]
         for at, place in enumerate(of_each):
-            there = _while_there(place, flights[at], told.of(place))
+            there = _limit_to_presence(place, flights[at], told.of(place))
             if len(there.came_s):
                 name = flights[at].name
                 (flights[at],) = flown_as_steered([flights[at]], [there])
@@ -137,14 +139,14 @@ class FlownMetric(TargetMetric):
 
     def manoeuvres(self, group: Group) -> Mapping[int, Told]:
         """Return the manoeuvres of who looks, of every replica of a group that has any."""
-        own = {k: told.of(self.viewer) for k, told in self._told(group).items()}
+        own = {k: told.of(self.viewer) for k, told in self._received_manoeuvres(group).items()}
         return {k: told for k, told in own.items() if len(told.came_s)}
 
     def steered_runs(self, group: Group) -> IntArray:
         """Return the replicas in which any aircraft is steered."""
-        return np.array(sorted(self._told(group)), dtype=np.int64)
+        return np.array(sorted(self._received_manoeuvres(group)), dtype=np.int64)
 
-    def _told(self, group: Group) -> Mapping[int, Told]:
+    def _received_manoeuvres(self, group: Group) -> Mapping[int, Told]:
         """Return the manoeuvres of every replica that has any; see `Told`.
 
         What is told is known when all before it is.
@@ -204,7 +206,7 @@ class FlownMetric(TargetMetric):
         if score == "separation":
             limits_m = [(level * radius_m, level * half_m) for level in levels]
             return self.of_flights(group, partial(first_within_s, limits_m), to_the_end=True)
-        told = self._told(group)
+        told = self._received_manoeuvres(group)
         result = np.full((len(levels), len(group)), np.inf)
         counts = np.zeros(len(group), dtype=np.int64)
         counts[list(told)] = [len(mine.came_s) for mine in told.values()]
@@ -263,7 +265,7 @@ class FlownMetric(TargetMetric):
     def _flights(
         self, group: Group, steered: bool, to_the_end: bool, some: IntArray | None = None
     ) -> tuple[list[list[RelativeFlight]], IntArray]:
-        steering = self._told(group) if steered else {}
+        steering = self._received_manoeuvres(group) if steered else {}
         target, step_s = getattr(self.p, "target", None), self.p.step_s
         return flights_of(
             group, step_s, target, steering, to_the_end=to_the_end, some=some, viewer=self.viewer
@@ -319,7 +321,7 @@ def flights_of(
             continue
         scene = group.scenes[number] if mine else group.scene
         make = partial(separations, scene, step_s, until_s, viewer)
-        flights = group.once(("separations", step_s, viewer, key), make)
+        flights = group.cached(("separations", step_s, viewer, key), make)
         runs.append([flight for flight in flights if target in (None, flight.name)])
         if alone and runs[-1]:
             steered.append(number)
@@ -327,14 +329,16 @@ def flights_of(
         (number, place, flight, there)
         for number in steered
         for place, flight in _aircraft_of(runs[run_of[number]]).items()
-        if len((there := _while_there(place, flight, steering[number].of(place))).came_s)
+        if len((there := _limit_to_presence(place, flight, steering[number].of(place))).came_s)
     ]
     flown = flown_as_steered([one[2] for one in told], [one[3] for one in told])
     by_run: dict[int, dict[int, SteeredFlight]] = {}
     for (number, place, *_), new in zip(told, flown, strict=True):
         by_run.setdefault(number, {})[place] = new
     for number, new_flights in by_run.items():
-        runs[run_of[number]] = [flight.flown(new_flights) for flight in runs[run_of[number]]]
+        runs[run_of[number]] = [
+            flight.replace_flights(new_flights) for flight in runs[run_of[number]]
+        ]
     return runs, run_of if some is None else run_of[some]
 
 
@@ -352,7 +356,7 @@ def _aircraft_of(run: Sequence[RelativeFlight]) -> dict[int, Any]:
     }
 
 
-def _while_there(place: int, flight: Any, told: Told) -> Told:
+def _limit_to_presence(place: int, flight: Any, told: Told) -> Told:
     """Return what an aircraft is told while it is there; the ownship always is."""
     if place < 0:
         return told

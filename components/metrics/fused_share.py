@@ -19,9 +19,9 @@ from components.metrics.rows import (
     FUSED,
     SensorMetricParameters,
     TargetMetric,
-    chosen,
     is_named,
-    of_target,
+    is_of_target,
+    select_rows,
     sensors_of,
     with_trials,
 )
@@ -74,14 +74,14 @@ class FusedShare(TargetMetric):
         """Count detections and those that were fused, in every replica."""
         detections: Any = group.tables["detections"]
         fused: Any = group.tables[FUSED]
-        rows = of_target(fused, self.p.target) & is_named(fused["block"], self.fusion)
-        fused = chosen(fused, rows, "target", "sensors", "time_s")
+        rows = is_of_target(fused, self.p.target) & is_named(fused["block"], self.fusion)
+        fused = select_rows(fused, rows, "target", "sensors", "time_s")
         values: dict[str, FloatArray] = {}
         for a, b in self.pairs:
-            seen = is_named(detections["block"], a) & of_target(detections, self.p.target)
-            own = chosen(detections, seen, "target", "time_s")
+            seen = is_named(detections["block"], a) & is_of_target(detections, self.p.target)
+            own = select_rows(detections, seen, "target", "time_s")
             both = _holds(fused["sensors"], a) & _holds(fused["sensors"], b)
-            pair = chosen(fused, both, "target", "time_s")
+            pair = select_rows(fused, both, "target", "time_s")
             used = _latest(own, pair, self.delay_s[a])
             trials = np.bincount(own["replica"], minlength=len(group))
             successes = np.bincount(own["replica"][used], minlength=len(group))
@@ -243,7 +243,7 @@ def mean_coincidence_share(
     for step in range(-reach, reach):
         index = after + step
         there = np.flatnonzero((index >= 0) & (index < len(theirs)))
-        share[there] += _within(theirs[index[there]] - mine[there], gate_ticks, sigma)
+        share[there] += _probability_in_gate(theirs[index[there]] - mine[there], gate_ticks, sigma)
     return float(np.mean(np.minimum(share, 1.0)))
 
 
@@ -251,7 +251,7 @@ def _grid(spec: ClockSpec, ticks_per_s: int, end_tick: int) -> IntArray:
     return ScanClock(spec, ticks_per_s).between(0, end_tick)[1]
 
 
-def _within(apart: IntArray, gate: int, sigma: float) -> FloatArray:
+def _probability_in_gate(apart: IntArray, gate: int, sigma: float) -> FloatArray:
     """Return the probability that a distance with normal error lies within the gate."""
     if sigma == 0.0:
         return np.asarray(np.abs(apart) <= gate, dtype=float)

@@ -28,7 +28,7 @@ from components.metrics.separation import (
     position_of,
 )
 from components.well_clear.separation import first_inside_cylinder
-from components.well_clear.volume import Volume, inside_cylinder, violation_span
+from components.well_clear.volume import Volume, is_inside_cylinder, violation_span
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -50,7 +50,7 @@ def closest(flight: RelativeFlight) -> tuple[float, float, str]:
     return *best, end_of_look(best[1], looked_s, present_s, flight.end_s)
 
 
-def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
+def first_times_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
     """Return when a target first is within each (horizontal, vertical) distance, s; NaN if never.
 
     Asked at the flight's times only, and exclusive; `first_losses_s` looks between them.
@@ -58,7 +58,9 @@ def first_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
     result = [float("nan")] * len(limits_m)
     for piece in flight.pieces():
         for number, (horizontal_m, vertical_m) in enumerate(limits_m):
-            inside = inside_cylinder(piece.horizontal_m, piece.vertical_m, horizontal_m, vertical_m)
+            inside = is_inside_cylinder(
+                piece.horizontal_m, piece.vertical_m, horizontal_m, vertical_m
+            )
             if np.isnan(result[number]) and inside.any():
                 result[number] = float(piece.time_s[np.argmax(inside)])
         if not np.isnan(result).any():
@@ -141,7 +143,7 @@ def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, fl
     result = np.full((len(flights), len(limits_m)), np.nan)
     between = [number for number, flight in enumerate(flights) if flight.between_samples]
     for number in sorted(set(range(len(flights))) - set(between)):
-        result[number] = first_inside(flights[number], *limits_m)
+        result[number] = first_times_inside(flights[number], *limits_m)
     if not between:
         return result
     rows = np.array(between)
@@ -181,7 +183,7 @@ def nearest_of(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArra
 def _nearest(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]:
     together = FlightsTogether(flights)
     first_s, last_s = together.present_s()
-    best = Approaches.none(len(flights))
+    best = Approaches.unknown(len(flights))
     grids: dict[tuple[float, float], list[int]] = {}
     for number, flight in enumerate(flights):
         grids.setdefault((flight.step_s, flight.grid_end_s), []).append(number)

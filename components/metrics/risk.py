@@ -77,7 +77,7 @@ class Mitigated(FlownMetric):
         ]
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return all of it for every replica: whoever is told nothing flies as without."""
+        """Return the flags of every replica; without a manoeuvre both flights are the same."""
         nominal = self.nominal(group)
         mitigated = {name: nominal[f"{name}_nominal"].copy() for name in _EVENTS}
         told = self.steered_runs(group)
@@ -232,7 +232,7 @@ class Severity(FlownMetric):
                     best, best_s = float(result[index]), float(time_s[index])
         if not best > 0.0:
             return best
-        return max(best, float(at(self._about(flight, best_s)).max()))
+        return max(best, float(at(self._refine_times(flight, best_s)).max()))
 
     def _collision(self, flight: RelativeFlight) -> float:
         """Return the probability at the horizontal closest approach."""
@@ -243,8 +243,8 @@ class Severity(FlownMetric):
                 best, best_s = float(piece.horizontal_m[index]), float(piece.time_s[index])
         if not np.isfinite(best):
             return float("nan")
-        time_s = self._about(flight, best_s)
-        across_m = flight.at(time_s).horizontal_m
+        time_s = self._refine_times(flight, best_s)
+        across_m = flight.separation_at(time_s).horizontal_m
         index = int(np.argmin(across_m))
         own, other = flight.states(time_s[index : index + 1])
         own_m, other_m = (np.asarray(state.alt_m, dtype=np.float64) for state in (own, other))
@@ -258,7 +258,7 @@ class Severity(FlownMetric):
         )
         return float(result[0])
 
-    def _about(self, flight: RelativeFlight, time_s: float) -> FloatArray:
+    def _refine_times(self, flight: RelativeFlight, time_s: float) -> FloatArray:
         """Return finer times about one, within the time at which both are there."""
         first_s, last_s = (float(times[0]) for times in flight.present_s())
         step_s = self.p.step_s / _FINER

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.metrics.censored import START, in_scan, said
+from components.metrics.censored import START, censoring_text, is_in_scan
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
@@ -81,7 +81,7 @@ def is_named(column: Any, name: str) -> BoolArray:
     return np.asarray(column.codes == column.names.index(name))
 
 
-def of_target(columns: Columns, target: str | None) -> BoolArray:
+def is_of_target(columns: Columns, target: str | None) -> BoolArray:
     """Return which rows are of the target (of any target: false alarms belong to none)."""
     if target is not None:
         return is_named(columns["target"], target)
@@ -90,7 +90,7 @@ def of_target(columns: Columns, target: str | None) -> BoolArray:
     return np.asarray(column.codes >= 0)
 
 
-def chosen(columns: Columns, rows: BoolArray, *names: str) -> dict[str, Any]:
+def select_rows(columns: Columns, rows: BoolArray, *names: str) -> dict[str, Any]:
     """Return the chosen rows of ``replica`` and the named columns."""
     kept = np.flatnonzero(rows)
     result: dict[str, Any] = {}
@@ -131,23 +131,23 @@ def earliest(time_s: FloatArray, range_m: FloatArray) -> IntArray:
     return np.where(none.all(axis=1), -1, nearest.argmin(axis=1))
 
 
-def picked(values: AnyArray, target: IntArray) -> AnyArray:
+def values_of_target(values: AnyArray, target: IntArray) -> AnyArray:
     """Return the value (replicas, targets) of one target of each replica; of one of -1 none."""
-    return _and_none(values)[np.arange(len(values)), target]
+    return _append_missing(values)[np.arange(len(values)), target]
 
 
-def columns_at(values: AnyArray, target: IntArray) -> AnyArray:
+def values_of_targets(values: AnyArray, target: IntArray) -> AnyArray:
     """Return values (replicas, targets) of some targets; of one that is -1 there are none."""
-    return _and_none(values)[:, target]
+    return _append_missing(values)[:, target]
 
 
-def _and_none(values: AnyArray) -> AnyArray:
+def _append_missing(values: AnyArray) -> AnyArray:
     """Return values (replicas, targets) with those of no target last: NaN, or 0 and False."""
     none = np.full((len(values), 1), np.nan if values.dtype.kind == "f" else 0, values.dtype)
     return np.concatenate([values, none], axis=1)
 
 
-def taken(columns: Columns, name: str, rows: IntArray) -> FloatArray:
+def column_at_rows(columns: Columns, name: str, rows: IntArray) -> FloatArray:
     """Return a column at some rows, of any shape, NaN where the row is -1."""
     values: Any = columns[name]
     result = np.full(rows.shape, np.nan)
@@ -175,7 +175,7 @@ def name_ranks(column: Any) -> IntArray:
 
 def scan_time_s(group: Group, name: str, number: int) -> FloatArray:
     """Return when a sensor's scan `number` (from 1) is in every replica, s; NaN without so many."""
-    time_s, start, end = group.once(("scans_of", name), lambda: _scans_of(group, name))
+    time_s, start, end = group.cached(("scans_of", name), lambda: _scans_of(group, name))
     at = start + number - 1
     result = np.full(len(group), np.nan)
     result[at < end] = time_s[at[at < end]]
@@ -191,14 +191,14 @@ def _scans_of(group: Group, name: str) -> tuple[FloatArray, IntArray, IntArray]:
     return columns["time_s"][rows], *ends
 
 
-def at_start(group: Group, name: str, time_s: FloatArray, scans: int = 1) -> BoolArray:
+def is_at_start(group: Group, name: str, time_s: FloatArray, scans: int = 1) -> BoolArray:
     """Return whether what takes so many scans of a sensor was seen as early as a start lets it.
 
     Times are those of replicas, or of replicas and their targets.
     """
-    return in_scan(time_s.T, scan_time_s(group, name, scans)).T
+    return is_in_scan(time_s.T, scan_time_s(group, name, scans)).T
 
 
 def start_or_never(cut: BoolArray, values: FloatArray) -> AnyArray:
     """Return the column that says where values are left-censored, by the start of the run."""
-    return said(np.where(cut, START, ""), values)
+    return censoring_text(np.where(cut, START, ""), values)

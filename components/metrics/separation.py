@@ -125,7 +125,7 @@ class RelativeFlight:
         self.end_s = end_s
         self._known: list[Separation] | None = None
 
-    def flown(self, flights: Mapping[int, Any]) -> "RelativeFlight":
+    def replace_flights(self, flights: Mapping[int, Any]) -> "RelativeFlight":
         """Return the same with other flights of the ownship (-1) and of targets, by their index."""
         result = copy(self)
         result.own, result.target = (
@@ -137,7 +137,7 @@ class RelativeFlight:
 
     @property
     def is_short(self) -> bool:
-        """Whether all of its times can be laid out."""
+        """Whether its sample times are few enough to hold in one array."""
         return self._count <= _KEPT
 
     @property
@@ -149,7 +149,10 @@ class RelativeFlight:
         """Return 0 and the times within the grid at which the source itself has samples, s."""
         result = [np.zeros(1)]
         for times in self._samples():
-            result += [_between(times, n, 0.0, self.grid_end_s) for n in self._sampled]
+            result += [
+                _sample_times_between(times, n, 0.0, self.grid_end_s)
+                for n in self._targets_with_samples
+            ]
         return np.unique(np.concatenate(result))
 
     def present_s(self) -> tuple[FloatArray, FloatArray]:
@@ -162,7 +165,7 @@ class RelativeFlight:
         fastest = float(self.own.max_speed_mps + self.target.max_speed_mps)
         return fastest * _SPEED_MARGIN + _TURN_MARGIN_MPS
 
-    def at(self, time_s: FloatArray) -> Separation:
+    def separation_at(self, time_s: FloatArray) -> Separation:
         """Return the distances at some times."""
         return Separation(self.name, time_s, *distances_m(*self.states(time_s)))
 
@@ -187,14 +190,14 @@ class RelativeFlight:
             time_s = regular_times_s(self.step_s, number)
             last_s = float(time_s[-1])
             for times in samples:
-                for number_sampled in self._sampled:
-                    new_s = _between(times, number_sampled, after_s, last_s)
+                for number_sampled in self._targets_with_samples:
+                    new_s = _sample_times_between(times, number_sampled, after_s, last_s)
                     time_s = np.union1d(time_s, new_s)
-            yield self.at(time_s)
+            yield self.separation_at(time_s)
             after_s = float(np.nextafter(last_s, np.inf))
 
     @property
-    def _sampled(self) -> list[int]:
+    def _targets_with_samples(self) -> list[int]:
         """Which targets' samples are those of the two."""
         return [place for place in self.places if place >= 0]
 
@@ -203,12 +206,14 @@ class RelativeFlight:
         return every
 
 
-def _between(times: SampleTimes, target: int, first_s: float, last_s: float) -> FloatArray:
+def _sample_times_between(
+    times: SampleTimes, target: int, first_s: float, last_s: float
+) -> FloatArray:
     """Return the times of a target in [first_s, last_s]."""
     one = np.array([target])
-    first, last = times.between(one, np.array([first_s]), np.array([last_s]))
+    first, last = times.numbers_between(one, np.array([first_s]), np.array([last_s]))
     number = np.arange(first[0], last[0] + 1)
-    return times.at(np.full(len(number), target), number)
+    return times.time_of(np.full(len(number), target), number)
 
 
 def distances_m(own: Any, other: Any) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from components.arguments.units import NAUTICAL_MILE_M
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import held
+from components.messages.state_tracks import is_held
 from components.metrics.flown_flights import PlatformTracks
 from components.metrics.rows import PlatformParameters
 from components.metrics.true_states import Coverage, position_in_frame, states_in_frame
@@ -87,7 +87,7 @@ class ErrorsByRange(PlatformTracks):
         """Return the sample of every replica at every range."""
         values = {result.name: np.full(len(group), np.nan) for result in self.results()}
         columns: Any = group.tables[_TABLE]
-        kept = held(columns["track_status"]) & np.asarray(columns["has_range"], dtype=bool)
+        kept = is_held(columns["track_status"]) & np.asarray(columns["has_range"], dtype=bool)
         names = columns["block"].names
         aboard = [names.index(name) for name in self.mine(names)]
         kept &= np.isin(columns["block"].codes, aboard)

@@ -14,10 +14,10 @@ from components.metrics.rows import (
     FUSED,
     TargetMetric,
     TargetParameters,
-    chosen,
+    is_of_target,
     name_ranks,
     numbers,
-    of_target,
+    select_rows,
 )
 from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -30,7 +30,7 @@ class _Lines:
     """Rows of one table, sorted by replica, target and time; *gaps* lie between two of a line."""
 
     def __init__(self, columns: Any, rows: BoolArray, *names: str) -> None:
-        self.rows = chosen(columns, rows, "target", "time_s", *names)
+        self.rows = select_rows(columns, rows, "target", "time_s", *names)
         target = name_ranks(self.rows["target"])
         self.order = _order(self.rows["replica"], target, self.rows["time_s"])
         self.replica: IntArray = self.rows["replica"][self.order]
@@ -99,7 +99,7 @@ class AgeOfInformation(TargetMetric):
         """Return mean and percentile of every replica."""
         columns = group.tables[FUSED]
         known = "measured_s" if "measured_s" in columns else "time_s"
-        lines = _Lines(columns, of_target(columns, self.p.target), known)
+        lines = _Lines(columns, is_of_target(columns, self.p.target), known)
         # A sweeping beam measures after its scan has begun, which is when its report is sent.
         made_s = np.minimum(lines.rows[known][lines.order], lines.time_s)
         # What arrives now may be older than what is held: the newest counts.
@@ -165,7 +165,7 @@ def _clipped_sums(ascending: FloatArray, at: FloatArray) -> FloatArray:
     return total[index] + (len(ascending) - index) * at
 
 
-def _updated(columns: Any, rows: BoolArray) -> BoolArray:
+def _is_updated(columns: Any, rows: BoolArray) -> BoolArray:
     """Return which of the rows hold another measurement than the one before of their line."""
     if "measured_s" not in columns:  # a recording that knows ages only, from arrivals
         return rows & np.asarray(columns["age_s"] <= 0.0)
@@ -211,7 +211,7 @@ class TrackUpdates(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return all four of every replica."""
         columns: Any = group.tables["tracks"]
-        lines = _Lines(columns, _updated(columns, of_target(columns, self.p.target)))
+        lines = _Lines(columns, _is_updated(columns, is_of_target(columns, self.p.target)))
         count = len(group)
         broken = np.maximum(lines.gap_s - self.p.break_after_s, 0.0)
         span = _sums(lines.of_gap, lines.gap_s, count)
@@ -257,7 +257,7 @@ class PositionError(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return both errors of every replica."""
         columns: Any = group.tables[FUSED]
-        rows = chosen(columns, of_target(columns, self.p.target), *self.tables[FUSED][1:])
+        rows = select_rows(columns, is_of_target(columns, self.p.target), *self.tables[FUSED][1:])
         seen = unit_vector_unchecked(rows["azimuth_rad"], rows["elevation_rad"])
         true = unit_vector_unchecked(rows["true_azimuth_rad"], rows["true_elevation_rad"])
         chord = chord_between(seen, true)

@@ -39,7 +39,7 @@ def set_distance(distance_m: FloatArray, cutoff_m: float, order: float = 2.0) ->
     if tracks == 0 and truths == 0:
         return SetDistance(0.0, 0.0, 0.0, 0.0, 0.0)
     powers = np.minimum(distance_m, cutoff_m) ** order
-    row, column = assigned(powers)
+    row, column = assign_least_cost(powers)
     near = powers[row, column]
     apart = abs(tracks - truths)
     ospa = (near.sum() + cutoff_m**order * apart) / max(tracks, truths)
@@ -55,7 +55,7 @@ def set_distance(distance_m: FloatArray, cutoff_m: float, order: float = 2.0) ->
     )
 
 
-def assigned(cost: FloatArray) -> tuple[IntArray, IntArray]:
+def assign_least_cost(cost: FloatArray) -> tuple[IntArray, IntArray]:
     """Return rows and columns of the assignment that costs least."""
     if cost.size == 0:
         none = np.empty(0, dtype=np.int64)
@@ -128,7 +128,7 @@ class TrackTally:
         for target in present.tolist():
             self.steps_present[target] = self.steps_present.get(target, 0) + 1
         left = set(range(count))
-        for track, k in zip(*assigned(np.minimum(apart, self.within_m)), strict=True):
+        for track, k in zip(*assign_least_cost(np.minimum(apart, self.within_m)), strict=True):
             if apart[track, k] >= self.within_m:
                 continue
             left.discard(int(track))

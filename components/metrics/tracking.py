@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import COVARIANCE, full_covariance, held
+from components.messages.state_tracks import COVARIANCE, full_covariance, is_held
 from components.metrics.flown_flights import PlatformTracks
 from components.metrics.rows import PlatformParameters, is_named
 from components.metrics.track_scores import ReportedTracks, TrackTally, innovation_results
@@ -130,7 +130,9 @@ class Tracking(PlatformTracks):
         """Return errors, honesty, distances of sets, and identities."""
         of = "" if self.p.block is None else f".{self.p.block}"
         series = [
-            Result(_at(end, of), NUMBER, f"normalised error squared up to {end:g} s", least=0.0)
+            Result(
+                _column_at(end, of), NUMBER, f"normalised error squared up to {end:g} s", least=0.0
+            )
             for end in self._ends_s
         ]
         whole = [
@@ -144,7 +146,7 @@ class Tracking(PlatformTracks):
         columns: Any = group.tables[_TABLE]
         of = "" if self.p.block is None else f".{self.p.block}"
         outcome = {result.name: np.full(len(group), np.nan) for result in self.results()}
-        confirmed = held(columns["track_status"])
+        confirmed = is_held(columns["track_status"])
         replica = np.asarray(columns["replica"])
         for number, scene in enumerate(group.scenes):
             asked = self._is_asked_for(columns["block"], scene)
@@ -161,7 +163,7 @@ class Tracking(PlatformTracks):
             for name, value in values.items():
                 outcome[name + of][number] = value
             for end in self._ends_s:
-                outcome[_at(end, of)][number] = tally.last_nees(end - self.p.series_s, end)
+                outcome[_column_at(end, of)][number] = tally.last_nees(end - self.p.series_s, end)
         return outcome
 
     def _is_asked_for(self, column: Any, scene: Scene) -> Any:
@@ -229,7 +231,7 @@ class Tracking(PlatformTracks):
         return columns["nis"][rows], columns["nis_freedom"][rows]
 
 
-def _at(end_s: float, of: str) -> str:
+def _column_at(end_s: float, of: str) -> str:
     return f"track_nees.time_s{of}.{end_s:g}"
 
 
@@ -240,7 +242,7 @@ def _keys(columns: Any) -> IntArray:
 
 
 def _standing(columns: Any, rows: IntArray, grid: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return instants of a grid (indices) and the rows that stand then, block by block.
+    """Return grid instants (indices) and the rows valid at them, block by block.
 
     A report stands from its own instant until its block's next one. A block reports all of its
     tracks at once, and the end of each, so that one without rows was left without tracks before.

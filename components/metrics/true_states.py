@@ -67,7 +67,7 @@ class TargetsInFrame:
         position, there = position_in_frame(flight, time_s, origin)
         return np.where(there, position, np.nan)
 
-    def at(self, time_s: FloatArray) -> FloatArray:
+    def positions_at(self, time_s: FloatArray) -> FloatArray:
         """Return where the targets are, (targets, 3, n), m."""
         result = [self.position(flight, time_s) for flight in self._flights]
         return np.array(result).reshape(len(result), 3, len(time_s))
@@ -76,8 +76,8 @@ class TargetsInFrame:
         """Return positions and velocities, (targets, 6, n), m and m/s."""
         before = np.maximum(time_s - _STEP_S, 0.0)
         after = before + 2.0 * _STEP_S
-        velocity = (self.at(after) - self.at(before)) / (2.0 * _STEP_S)
-        return np.concatenate([self.at(time_s), velocity], axis=1)
+        velocity = (self.positions_at(after) - self.positions_at(before)) / (2.0 * _STEP_S)
+        return np.concatenate([self.positions_at(time_s), velocity], axis=1)
 
 
 def reaches_of(scene: Scene, on: Collection[str] | None = None) -> list[Reach]:

@@ -74,21 +74,21 @@ def displaced_position(
     for error in errors:
         require_between("position error", error, -most, most, f"be within ±{most:g} m")
     north, east, down = errors
-    new_lat, new_lon = _displaced(lat, lon, alt - down, north, east)
+    new_lat, new_lon = _displace(lat, lon, alt - down, north, east)
     stays = (north == 0.0) & (east == 0.0)
     return (
         unflatten(np.where(stays, lat, new_lat), shape),
         unflatten(np.where(stays, lon, new_lon), shape),
-        unflatten(_off(alt, -down), shape),
+        unflatten(_add_error(alt, -down), shape),
     )
 
 
-def _off(value: FloatArray, error: FloatArray) -> FloatArray:
+def _add_error(value: FloatArray, error: FloatArray) -> FloatArray:
     """Return values that are off by errors; every bit stays where there is none."""
     return np.where(error == 0.0, value, value + error)
 
 
-def _displaced(
+def _displace(
     lat_deg: FloatArray, lon_deg: FloatArray, alt: FloatArray, north: FloatArray, east: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     lat = np.radians(lat_deg)
@@ -235,7 +235,7 @@ class NavigationErrors(_Navigation[Believing]):
             errors[3] = errors[3] + turned
             attitude = states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad
             return dict(
-                zip(POSE_FIELDS, (*position, *map(_off, attitude, errors[3:])), strict=True)
+                zip(POSE_FIELDS, (*position, *map(_add_error, attitude, errors[3:])), strict=True)
             )
 
         return believed
@@ -252,12 +252,12 @@ class NavigationReport(_Navigation[Reporting]):
         noise = navigation_noise(block.context) if block.turned_by_belief else (none, none)
 
         def report(detections: Detections, targets: RelativeTargets, rows: IntArray) -> Detections:
-            return with_navigation_noise(in_the_horizons_axes(detections, targets, rows), *noise)
+            return with_navigation_noise(add_horizon_angles(detections, targets, rows), *noise)
 
         return report
 
 
-def in_the_horizons_axes(
+def add_horizon_angles(
     detections: Detections, targets: RelativeTargets, rows: IntArray
 ) -> Detections:
     """Add each detection's line of sight in NED, by what the ownship believes of its attitude."""

@@ -80,7 +80,7 @@ class Console(Component):
         made = []
         for tick, decision in self.due(wake):
             index = self._take_alerts(came, index, tick)
-            taken = self._commanded(tick / self.context.ticks_per_s, decision)
+            taken = self._schedule_command(tick / self.context.ticks_per_s, decision)
             made.append((tick, decision, self._alerts.get(decision.target), taken))
         self._take_alerts(came, index, None)
         if not made:
@@ -92,7 +92,7 @@ class Console(Component):
     def acknowledge(self, taken: Sequence[Taken]) -> None:
         """Tell whoever decided that what was due is taken in, in its order."""
 
-    def _commanded(self, time_s: float, decision: OperatorDecision) -> Taken:
+    def _schedule_command(self, time_s: float, decision: OperatorDecision) -> Taken:
         """Return when a decision is flown, and what it replaces.
 
         A turn replaces a turn and a climb a climb; one of each is flown at the same time.
@@ -119,11 +119,11 @@ class Console(Component):
                 rows = int(np.searchsorted(arrived.tick, until, side="right"))
             for index in range(row, rows):
                 entries = slice(int(alerts.offsets[index]), int(alerts.offsets[index + 1]))
-                self._alerts = self._after(alerts, entries, int(arrived.tick[index]))
+                self._alerts = self._update_alerts(alerts, entries, int(arrived.tick[index]))
             row = max(row, rows)
         return row
 
-    def _after(self, alerts: AlertLevels, entries: slice, tick: int) -> dict[str, _Alert]:
+    def _update_alerts(self, alerts: AlertLevels, entries: slice, tick: int) -> dict[str, _Alert]:
         """Return the alerts that are on once a row of levels has come."""
         now = {}
         level, contacts = alerts.level[entries], alerts.contacts()[entries]
@@ -194,7 +194,7 @@ class Desk:
         self._waiting: list[PendingDecision] = []
         self._open = True
 
-    def put(self, pending: PendingDecision) -> bool:
+    def submit(self, pending: PendingDecision) -> bool:
         """Put a decision on the desk; False if the run is over or too many wait."""
         with self._lock:
             if not self._open or len(self._waiting) >= MOST_WAITING:
@@ -246,7 +246,7 @@ class Human(Console):
         return [(tick, pending.decision) for pending in self._taken]
 
     def acknowledge(self, taken: Sequence[Taken]) -> None:
-        """Tell each page what became of its decision."""
+        """Tell each page whether its decision was taken."""
         for pending, one in zip(self._taken, taken, strict=True):
             pending.taken(one)
 

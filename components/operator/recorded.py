@@ -16,7 +16,7 @@ from dsa_des.block.component import ScenePath
 from dsa_des.block.wake import Wake
 from dsa_des.errors import did_you_mean
 from dsa_des.files.input_files import InputFileError, read_input_bytes, read_input_text
-from dsa_des.text.safe_text import printable, shortened
+from dsa_des.text.safe_text import printable, shorten
 
 _NAMES = ("time_s", "decision", "target", "turn_rad", "climb_m", "wall_time_s")
 _MOST_PROBLEMS = 5
@@ -31,7 +31,7 @@ def _unknown(value: Any) -> Any:
     return math.nan if value is None or value == "" else value
 
 
-def _no_name(value: Any) -> Any:
+def _blank_to_none(value: Any) -> Any:
     return "" if value is None else value
 
 
@@ -40,7 +40,7 @@ class _DecisionRow(BaseModel):
 
     time_s: float = Field(ge=0, allow_inf_nan=False)
     decision: Literal["shown", "looked", "verified", "rejected", "turn", "climb"]
-    target: Annotated[str, BeforeValidator(_no_name)] = ""
+    target: Annotated[str, BeforeValidator(_blank_to_none)] = ""
     turn_rad: Annotated[
         float, BeforeValidator(_nothing), Field(ge=-MOST_TURN_RAD, le=MOST_TURN_RAD)
     ] = 0.0
@@ -49,7 +49,7 @@ class _DecisionRow(BaseModel):
     ] = 0.0
     wall_time_s: Annotated[float, BeforeValidator(_unknown)] = math.nan
 
-    def decided(self) -> OperatorDecision:
+    def to_decision(self) -> OperatorDecision:
         kind = KINDS.index(self.decision)
         turn_rad = self.turn_rad if kind == TURN else 0.0
         climb_m = self.climb_m if kind == CLIMB else 0.0
@@ -76,11 +76,13 @@ def read_decisions(path: Path) -> list[tuple[float, OperatorDecision]]:
         try:
             read = _DecisionRow.model_validate(row)
         except ValidationError as error:
-            problems += [_said(where, problem) for problem in error.errors(include_url=False)]
+            problems += [
+                _located_message(where, problem) for problem in error.errors(include_url=False)
+            ]
             continue
         if result and read.time_s < result[-1][0]:
             problems.append(f"{where}: time_s is {read.time_s:g}: it must not go back")
-        result.append((read.time_s, read.decided()))
+        result.append((read.time_s, read.to_decision()))
     if problems:
         more = len(problems) - _MOST_PROBLEMS
         said = problems[:_MOST_PROBLEMS] + ([f"and {more} more"] if more > 0 else [])
@@ -115,9 +117,9 @@ def _check_names(path: Path, names: Iterable[str]) -> None:
             raise ValueError(f"{path}: has no column {needed!r}: it is no table of decisions{near}")
 
 
-def _said(where: str, problem: Any) -> str:
+def _located_message(where: str, problem: Any) -> str:
     name = ".".join(str(part) for part in problem["loc"])
-    value = shortened(printable(str(problem["input"])), 60)
+    value = shorten(printable(str(problem["input"])), 60)
     return f"{where}: {name} is {value!r}: {problem['msg'].lower()}"
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.flights.point_mass import LEAST_EASING_S
-from components.guidance.daidalus import ConfParameters, changes_out, why_never_steers
+from components.guidance.daidalus import ConfParameters, changes_out_of_bands, explain_no_steering
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.operator.pilot_model import Draws, mean_pause_s, pause_s, response_s, steering
@@ -155,7 +155,7 @@ class Stochastic(Component):
 
     def warnings(self) -> list[str]:
         """Say why it never steers, where that is so."""
-        return why_never_steers(
+        return explain_no_steering(
             self.p.level, self._configuration, self._alerter, self.context.producers
         )
 
@@ -176,7 +176,7 @@ class Stochastic(Component):
                 self._minds[mind.run], self._next[mind.run] = mind, self._next_tick(mind)
             choosing += [(int(rows[k]), minds[k]) for k in chooses]
             acting += [(int(rows[k]), minds[k].run) for k in acts]
-        return Manoeuvres.at_rows(wake.instants, self._sent(alerts, choosing, acting))
+        return Manoeuvres.at_rows(wake.instants, self._begin_manoeuvres(alerts, choosing, acting))
 
     def _has_to_do(self, wake: Wake, highest: IntArray) -> BoolArray:
         """Tell at which rows something may change: nothing does without an alert, now or before,
@@ -199,7 +199,7 @@ class Stochastic(Component):
             return math.floor(max(held, mind.free_from))
         return math.floor(mind.acts_at if mind.chooses_at is None else mind.chooses_at)
 
-    def _sent(
+    def _begin_manoeuvres(
         self,
         alerts: AlertLevels,
         choosing: Sequence[tuple[int, Mind]],
@@ -317,7 +317,7 @@ class Stochastic(Component):
                 if not rows:
                     continue
                 kind = "hdir" if is_turn else "alt"
-                every = changes_out(kind, self._configuration, self._alerter, alerts, rows)
+                every = changes_out_of_bands(kind, self._configuration, self._alerter, alerts, rows)
                 for row, changes in zip(rows, every, strict=True):
                     change = 0.0
                     if changes is not None:

@@ -13,7 +13,7 @@ from components.aircraft.aspect_tables import SilhouetteTable
 from components.optical.infrared_area import infrared_area
 from components.optical.mesh import TriangleMesh
 from components.optical.silhouette import PLATE_ASPECT_RATIO, union_area, visible_area
-from components.sensor.look import Cells, turned_to_sight
+from components.sensor.look import Cells, aspect_angles_of_cells
 from dsa_des.arrays.types import FloatArray
 
 
@@ -40,7 +40,7 @@ def area_by_table(cells: Cells, of_target: Mapping[str, Sequence[Any]], model: s
     for index, item in enumerate(distinct):
         chosen = np.flatnonzero(which[cells.craft] == index)
         area[chosen] = visible_area(
-            *turned_to_sight(cells, chosen),
+            *aspect_angles_of_cells(cells, chosen),
             model=model,
             **{kind: item},
         )
@@ -56,7 +56,7 @@ MESH_ROWS = 64
 
 
 @lru_cache(maxsize=256)
-def sampled_table(
+def silhouette_table_of_bodies(
     front_m2: float, side_m2: float, horizontal_m2: float, back_m2: float | None = None
 ) -> SilhouetteTable:
     """Return the silhouette of the union of the three bodies at every 5 degrees of aspect."""
@@ -151,7 +151,7 @@ def check_silhouette(roster: Roster, band: str, silhouette: str) -> None:
                 )
 
 
-def fitted_otherwise(roster: Roster, band: str, silhouette: str) -> list[str]:
+def warn_of_other_fits(roster: Roster, band: str, silhouette: str) -> list[str]:
     """Warn of targets whose areas were fitted as a union and that are shown as single bodies."""
     if silhouette not in ("exact", "thesis"):
         return []
@@ -177,7 +177,10 @@ def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
     names = (*_BODIES, "back_m2") if band == "ir" else _BODIES
     areas = {name: cells.roster.column(f"{band}.{name}") for name in names}
     if silhouette == "sampled_table":
-        tables = [sampled_table(*map(float, row)) for row in zip(*areas.values(), strict=True)]
+        tables = [
+            silhouette_table_of_bodies(*map(float, row))
+            for row in zip(*areas.values(), strict=True)
+        ]
         return area_by_table(cells, {"table": tables}, "aspect_table")
     if silhouette == "mesh":
         check_silhouette(cells.roster, band, silhouette)
@@ -185,7 +188,7 @@ def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
         meshes = [body_mesh(*map(float, body)) for body in bodies]
         return area_by_table(cells, {"mesh": meshes}, "convex_hull")
     compute: Any = infrared_area if band == "ir" else visible_area
-    view = turned_to_sight(cells)
+    view = aspect_angles_of_cells(cells)
     shown = {name: cells.of_target(column) for name, column in areas.items()}
     if len(cells) <= CELLS_AT_ONCE:
         small: FloatArray = compute(*view, model=silhouette, validate=False, **shown)

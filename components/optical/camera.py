@@ -11,23 +11,23 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import known_targets
-from components.optical.area_of_cells import check_silhouette, fitted_otherwise
+from components.optical.area_of_cells import check_silhouette, warn_of_other_fits
 from components.optical.contrast import CONTRAST
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
     FAINTEST_PD,
     FrameFalseAlarms,
     detection_probability,
-    filtered_share,
     noise_equivalent_pixels,
-    pixels_of_filtered,
+    pixels_for_filtered_count,
+    point_filter_share,
 )
 from components.optical.detector import (
     CameraCalibration,
     CameraDetector,
     centroid_variance,
     farthest_detection_m,
-    settled,
+    settle_detector,
 )
 from components.optical.infrared_area import AREA
 from components.optical.signature import SIGNATURE, DynamicSignature, pixels_of_cells
@@ -132,7 +132,7 @@ class CameraParameters(GlintParameters, SensorParameters):
         return said
 
     @model_validator(mode="after")
-    def _any_two_say_the_others(self) -> Self:
+    def _check_angles_and_pixels(self) -> Self:
         keys = "threshold", "noise_equivalent_contrast", "false_alarms_per_frame", "calibrate"
         given = [key for key in keys if getattr(self, key) is not None]
         silent = self.noise_equivalent_contrast == 0
@@ -157,10 +157,10 @@ class CameraParameters(GlintParameters, SensorParameters):
             return self.false_alarms
         if self.false_alarms_per_frame is not None:
             return self.false_alarms_per_frame > 0.0
-        return self.settles_false_alarms
+        return self.states_false_alarms
 
     @property
-    def settles_false_alarms(self) -> bool:
+    def states_false_alarms(self) -> bool:
         """Whether two other keys say how many false alarms there are, few or many."""
         others = self.threshold, self.noise_equivalent_contrast, self.calibrate
         if self.noise_equivalent_contrast == 0.0 or others.count(None) != 1:
@@ -174,7 +174,7 @@ class Camera(Sensor):
     E = a·Q·P + b·V with Q pixels covered, P contrast gain and V the rate of the line of sight
     (eq. 18). Each look measures E once with Gaussian noise, as a filter does that fits the target:
     of Q pixels the share sqrt(s / (s + Q)) counts, in the noise of a point, whose picture takes s
-    pixels (`filtered_share`). Confidence is C = sample - threshold, in the unit of the threshold
+    pixels (`point_filter_share`). Confidence is C = sample - threshold, in the threshold's unit
     (eq. 19); pixels are those that a target of contrast 1 covers whose signature is the sample.
     ``looks`` has the pixels that are covered, and Pd.
     """
@@ -213,7 +213,7 @@ class Camera(Sensor):
     def detector(self) -> CameraDetector:
         """Its threshold and noise, by what the scene states of them."""
         places = max(1, round(self.all_pixels / self.spot))
-        return settled(self, places, self._weight * math.sqrt(self.spot))
+        return settle_detector(self, places, self._weight * math.sqrt(self.spot))
 
     @cached_property
     def spot(self) -> float:
@@ -260,7 +260,7 @@ class Camera(Sensor):
             range_km = self.reach.range_max_m / 1000.0
             said.append(
                 f"targets beyond {range_km:.2f} km: not looked at, even the largest of them, seen "
-                f"from its largest side, {self._too_faint()} there"
+                f"from its largest side, {self._describe_faint_range()} there"
             )
         if self.p.model == "auto":
             said.append(
@@ -269,7 +269,7 @@ class Camera(Sensor):
             )
         return said
 
-    def _too_faint(self) -> str:
+    def _describe_faint_range(self) -> str:
         if self.detector.noise:
             return f"has a Pd below {FAINTEST_PD:g}, which counts as none,"
         return "cannot reach the threshold"
@@ -288,7 +288,7 @@ class Camera(Sensor):
         """Return the area that shows in each cell, m²."""
         raise TypeError(f"{type(self).__name__} has no area(cells)")
 
-    def shown_area(self, cells: Cells) -> FloatArray:
+    def visible_area_m2(self, cells: Cells) -> FloatArray:
         """Return the area that shows in each cell with what the scene's effects add to it, m²."""
         area = self.area(cells)
         for added in self._areas:
@@ -301,7 +301,7 @@ class Camera(Sensor):
 
     def look(self, cells: Cells) -> Look:
         """Compare every target's signature with the threshold."""
-        area = self.shown_area(cells)
+        area = self.visible_area_m2(cells)
         pixels = pixels_of_cells(
             area,
             cells.range_m,
@@ -329,14 +329,14 @@ class Camera(Sensor):
         margin = sample - threshold
         seen = (margin >= 0.0) & (signature > threshold - FAINTEST_DEVIATIONS * noise)
         extras = {"pixels": pixels}
-        if self._says_looks:
+        if self._is_asked_for_looks:
             extras["detection_probability"] = detection_probability(signature, threshold, noise)
         return Look(seen, margin, extras, self.signal_of(sample, np.ones(len(cells))))
 
     def share(self, pixels: FloatArray) -> FloatArray:
         """Return how much of a signature counts: all, where a camera sees them without noise."""
         silent = self.p.noise_equivalent_contrast == 0.0
-        return np.ones_like(pixels) if silent else filtered_share(pixels, self.spot)
+        return np.ones_like(pixels) if silent else point_filter_share(pixels, self.spot)
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return what is recorded beside a detection: of a measured signature what it says."""
@@ -372,7 +372,7 @@ class Camera(Sensor):
         """Say which cues change nothing, and whose areas were made for another silhouette."""
         said = [*super().warnings(), *cue_warnings(self)]
         for roster in known_targets(self.context) if self.areas else ():
-            said += fitted_otherwise(roster, self.areas, self.p.silhouette)
+            said += warn_of_other_fits(roster, self.areas, self.p.silhouette)
         return said
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
@@ -399,5 +399,5 @@ class Camera(Sensor):
         """Return the signal of targets that have some signatures by their size alone (eq. 18)."""
         pixels = np.maximum(signature, 0.0) / (self._weight * contrast)
         if self.p.noise_equivalent_contrast != 0.0:
-            pixels = pixels_of_filtered(pixels, self.spot)
+            pixels = pixels_for_filtered_count(pixels, self.spot)
         return {"pixels": np.minimum(pixels, self.all_pixels), "contrast": contrast}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, not_negative, positive, unflatten
+from components.arguments.checks import broadcast_flat, check_not_negative, positive, unflatten
 from components.atmosphere.visibility import KOSCHMIEDER
 from components.geometry import angle_between
 from components.optical.luminance import background_luminance, inherent_contrast, target_luminance
@@ -47,7 +47,7 @@ def contrast_gain(
     """
     if model not in ("constant", "daylight"):
         raise ValueError(f"model is {model!r}: it must be 'constant' or 'daylight'")
-    gain = not_negative("contrast", contrast)
+    gain = check_not_negative("contrast", contrast)
     if model == "daylight":
         target = target_luminance(
             azimuth_rad,
@@ -68,7 +68,7 @@ def contrast_gain(
             background=background,
         )
         from_sun = angle_between(azimuth_rad, elevation_rad, sun_azimuth_rad, sun_elevation_rad)
-        blinded = from_sun < not_negative("sun_exclusion_rad", sun_exclusion_rad)
+        blinded = from_sun < check_not_negative("sun_exclusion_rad", sun_exclusion_rad)
         gain = gain * np.where(blinded, 0.0, inherent_contrast(target, behind))
     shape = np.broadcast_shapes(
         np.shape(gain), np.shape(azimuth_rad), np.shape(elevation_rad), np.shape(range_m)
@@ -86,7 +86,7 @@ def visibility_transmission(range_m: ArrayLike, visibility_m: ArrayLike) -> Any:
     in even haze; used for every background here.
     """
     shape, (distance, visibility) = broadcast_flat(
-        range_m=not_negative("range_m", range_m),
+        range_m=check_not_negative("range_m", range_m),
         visibility_m=positive("visibility_m", visibility_m),
     )
     # From 200 visibilities on nothing is left that a double could hold.

@@ -17,14 +17,14 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
+    check_not_negative,
     finite,
-    not_negative,
     positive,
     refuse,
     unflatten,
 )
 from components.messages.detections import REPORT, Detections, Reporting
-from components.messages.false_detections import add_false_detections, in_measured_order
+from components.messages.false_detections import add_false_detections, sort_by_measurement
 from components.radar.detection.output import false_alarm_count
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
@@ -49,7 +49,7 @@ def noise_equivalent_pixels(blur_pixels: float) -> float:
     return 4.0 * math.pi * (blur**2 + _PIXEL_VARIANCE)
 
 
-def filtered_share(pixels: FloatArray, spot: float) -> FloatArray:
+def point_filter_share(pixels: FloatArray, spot: float) -> FloatArray:
     """Return how much of a target's signature counts, in the noise of a point's picture.
 
     A filter that fits a target of N pixels lets in the noise of the pixels of its blur and of its
@@ -61,8 +61,8 @@ def filtered_share(pixels: FloatArray, spot: float) -> FloatArray:
     return share
 
 
-def pixels_of_filtered(filtered: FloatArray, spot: float) -> FloatArray:
-    """Return the pixels N of which N times `filtered_share` is so much."""
+def pixels_for_filtered_count(filtered: FloatArray, spot: float) -> FloatArray:
+    """Return the pixels N of which N times `point_filter_share` is so much."""
     half = filtered * filtered / (2.0 * spot)
     pixels: FloatArray = half + filtered * np.sqrt(1.0 + half / (2.0 * spot))
     return pixels
@@ -75,7 +75,7 @@ def detection_probability(signature: ArrayLike, threshold: ArrayLike, noise: Arr
     shape, (level, needed, deviation) = broadcast_flat(
         signature=finite("signature", signature),
         threshold=finite("threshold", threshold),
-        noise=not_negative("noise", noise),
+        noise=check_not_negative("noise", noise),
     )
     silent = deviation == 0.0
     above = (level - needed) / np.where(silent, 1.0, deviation)
@@ -83,7 +83,7 @@ def detection_probability(signature: ArrayLike, threshold: ArrayLike, noise: Arr
     return unflatten(np.where(silent, np.where(level >= needed, 1.0, 0.0), drawn), shape)
 
 
-def deviations_exceeded(probability: float) -> float:
+def deviations_of_exceedance(probability: float) -> float:
     """Return how many standard deviations Gaussian noise exceeds with some probability."""
     return -_NORMAL.inv_cdf(probability)
 
@@ -131,7 +131,9 @@ def false_alarm_signature(uniform: ArrayLike, *, threshold: float, noise: float)
     deviation = float(positive("noise", noise))
     tail = exceeding_probability(level / deviation)
     # One by one: there are few, and the library's quantile is good to the last places.
-    found = [deviation * deviations_exceeded(tail * (1.0 - u)) for u in draws.reshape(-1).tolist()]
+    found = [
+        deviation * deviations_of_exceedance(tail * (1.0 - u)) for u in draws.reshape(-1).tolist()
+    ]
     return np.maximum(np.array(found), level).reshape(draws.shape)
 
 
@@ -179,7 +181,7 @@ class AddedFalseAlarms:
             return detections
         marked = self._block.p.marked_false_alarms
         joined = self._with_alarms(detections, marked)
-        return joined if marked else in_measured_order(joined)
+        return joined if marked else sort_by_measurement(joined)
 
     def _with_alarms(self, detections: Detections, marked: bool) -> Detections:
         block, reach = self._block, self._block.reach
@@ -242,7 +244,7 @@ class FrameFalseAlarms(Effect[Reporting]):
             return Verdict(False, "enabled is false")
         if p.false_alarms is not None:
             return Verdict.of_flag(p, "false_alarms")
-        if p.false_alarms_per_frame is None and p.settles_false_alarms:
+        if p.false_alarms_per_frame is None and p.states_false_alarms:
             return Verdict(True, "two other keys say how many there are")
         if p.false_alarms_per_frame is None:
             return Verdict(False, "neither false_alarms nor false_alarms_per_frame is given")

@@ -9,16 +9,16 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, InfraredAreas, Roster
 from components.aircraft.known_targets import known_targets
-from components.arguments.checks import not_negative, positive
+from components.arguments.checks import check_not_negative, positive
 from components.optical.contrast import CONTRAST, visibility_transmission
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
-    deviations_exceeded,
+    deviations_of_exceedance,
     exceeding_probability,
 )
 from components.optical.infrared_area import AREA
 from components.optical.signature import SIGNATURE, pixels_of_cells
-from components.optical.weather_effects import own_band
+from components.optical.weather_effects import infrared_band_of
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.component import Parameters
 
@@ -39,8 +39,8 @@ def centroid_variance(
     noise within the spot, N > 10 s, and the blur is half a pixel or more; a sharper spot falls
     between pixels, and a target of many pixels with sharp edges is found better than this.
     """
-    covered = np.asarray(not_negative("pixels", pixels))
-    ratio = np.asarray(not_negative("contrast_to_noise", contrast_to_noise))
+    covered = np.asarray(check_not_negative("pixels", pixels))
+    ratio = np.asarray(check_not_negative("contrast_to_noise", contrast_to_noise))
     blur = float(positive("blur_pixels", blur_pixels))
     spread = blur**2 + _PIXEL_VARIANCE * covered + _PIXEL_VARIANCE
     most = _PIXEL_VARIANCE * (covered + 1.0)
@@ -86,7 +86,7 @@ class CameraCalibration(Parameters):
     )
 
     @model_validator(mode="after")
-    def _of_one_target(self) -> Self:
+    def _check_one_target(self) -> Self:
         if (self.area_m2 is None) == (self.aircraft is None):
             raise ValueError("exactly one of area_m2 and aircraft must be given")
         if self.area_m2 is not None and self.aspect_deg:
@@ -106,7 +106,7 @@ class CameraDetector:
     false_alarms: float  # Expected in a frame
 
 
-def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetector:
+def settle_detector(camera: Any, places: int, noise_of_contrast: float) -> CameraDetector:
     """Return a camera's detector: what the scene leaves open follows from what it states.
 
     Any two of threshold, noise, false alarms and a known range give the others.
@@ -117,7 +117,7 @@ def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetecto
     if contrast == 0.0:  # the thesis's rule, beside which a rate of false alarms may be stated
         level = 1.0 if threshold is None else threshold
         rate = alarms or 0.0
-        noise = level / _crossed(rate, places) if level > 0.0 and rate > 0.0 else 1.0
+        noise = level / threshold_deviations(rate, places) if level > 0.0 and rate > 0.0 else 1.0
         return CameraDetector(level, 0.0, noise, places, rate)
     given = sum(one is not None for one in (threshold, contrast, alarms, known))
     if given == 0 or (given == 1 and alarms is not None):
@@ -130,12 +130,12 @@ def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetecto
         )
     noise = None if contrast is None else noise_of_contrast * contrast
     if known is not None:
-        signature = known_signature(camera, known)
-        above = -deviations_exceeded(known.pd)
+        signature = calibrated_signature(camera, known)
+        above = -deviations_of_exceedance(known.pd)
         if noise is not None:
             threshold = signature - above * noise
         elif alarms is not None:
-            crossed = _crossed(alarms, places)
+            crossed = threshold_deviations(alarms, places)
             if not above + crossed > 0.0:
                 raise ValueError(
                     f"calibrate.pd is {known.pd:g}: noise alone is detected more often, with "
@@ -160,19 +160,19 @@ def settled(camera: Any, places: int, noise_of_contrast: float) -> CameraDetecto
             )
     elif threshold is None:
         assert noise is not None and alarms is not None
-        threshold = noise * _crossed(alarms, places)
+        threshold = noise * threshold_deviations(alarms, places)
     elif noise is None:
         assert alarms is not None
         if threshold <= 0.0:  # whatever there is is seen: nothing is known of the noise
             return CameraDetector(threshold, 0.0, 1.0, places, alarms)
-        noise = threshold / _crossed(alarms, places)
+        noise = threshold / threshold_deviations(alarms, places)
     if noise == 0.0:
         return CameraDetector(threshold, 0.0, 1.0, places, 0.0)
     rate = places * exceeding_probability(threshold / noise)
     return CameraDetector(threshold, noise, noise, places, rate)
 
 
-def _crossed(false_alarms: float, places: int) -> float:
+def threshold_deviations(false_alarms: float, places: int) -> float:
     """Return how many standard deviations the threshold lies above noise; infinite for none."""
     if false_alarms == 0.0:
         return math.inf
@@ -181,14 +181,14 @@ def _crossed(false_alarms: float, places: int) -> float:
             f"false_alarms_per_frame is {false_alarms:g}: it must be below {0.5 * places:g}, half "
             f"of the {places:,} places for them in a frame"
         )
-    return deviations_exceeded(false_alarms / places)
+    return deviations_of_exceedance(false_alarms / places)
 
 
 class _OneLook:
     """One cell: an aircraft at a known range, aspect and contrast, level and at our altitude."""
 
     def __init__(self, craft: Aircraft, range_m: float, aspect_rad: float) -> None:
-        self.roster = Roster.of([("calibrate", craft)])
+        self.roster = Roster.from_pairs([("calibrate", craft)])
         self.range_m = np.array([range_m])
         self.relative_heading_rad = np.array([math.pi - aspect_rad])
         self.target_pitch_rad = self.target_roll_rad = self.elevation_rad = np.zeros(1)
@@ -201,7 +201,7 @@ class _OneLook:
         return column[self.craft]
 
 
-def known_signature(camera: Any, known: CameraCalibration) -> float:
+def calibrated_signature(camera: Any, known: CameraCalibration) -> float:
     """Return the signature of the target whose probability of detection is known."""
     craft = known.aircraft
     if craft is None:  # a sphere shows the same to all sides
@@ -219,9 +219,10 @@ def known_signature(camera: Any, known: CameraCalibration) -> float:
     )
     contrast = camera.contrast(cells) if known.contrast is None else np.full(1, known.contrast)
     if known.visibility_km is not None:
-        if own_band(camera) is not None:
+        if infrared_band_of(camera) is not None:
             raise ValueError(
-                f"calibrate.visibility_km is given and extinction_band is {own_band(camera)!r}: "
+                "calibrate.visibility_km is given and extinction_band is "
+                f"{infrared_band_of(camera)!r}: "
                 "that band's air is another; give the contrast that is left (calibrate.contrast)"
             )
         contrast = contrast * visibility_transmission(range_m, 1000.0 * known.visibility_km)

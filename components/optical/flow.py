@@ -75,7 +75,7 @@ def find_spot(picture: FloatArray, sought: BoolArray, spread_pixels: float, nois
     spread = spread_pixels
     while spread <= max(picture.shape[0] / 6.0, spread_pixels):
         through = cv2.GaussianBlur(flat, (0, 0), spread, borderType=cv2.BORDER_REFLECT)
-        white = noise * _let_through(picture.shape[0], spread)
+        white = noise * _filter_noise_gain(picture.shape[0], spread)
         rough = float(np.median(np.abs(through[rim]))) / _OF_MEDIAN
         finest = spread == spread_pixels
         rough = rough if rough > (_CLUTTERED if finest else _COARSE) * white else 0.0
@@ -103,7 +103,8 @@ def find_spot(picture: FloatArray, sought: BoolArray, spread_pixels: float, nois
 def _middle(
     stands: BoolArray, picture: FloatArray, row: int, column: int, otherwise: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return the centre of what stands out around a pixel, x and y; if that is beside it, another.
+    """Return the centroid (x, y) of the bright spot around a pixel, moved if that lies off the
+    pixel.
 
     It is weighed by the picture, as its edge covers pixels in part.
     """
@@ -115,7 +116,7 @@ def _middle(
 
 
 @cache
-def _let_through(size: int, spread: float) -> float:
+def _filter_noise_gain(size: int, spread: float) -> float:
     """Return the deviation that a filter, less the rim's mean, makes of white noise of deviation 1.
 
     Of the filter as it is in pixels: by the formula for a continuous picture noise comes out as 1.1
@@ -176,17 +177,17 @@ def spot_flow(
     mask = _mask(later, spot, sought)
     if mask is None:
         return _NOTHING
-    ahead = _whole_pixels(earlier, later, spot, mask)
-    second = _covered(later, mask, spot)
+    ahead = _match_whole_pixels(earlier, later, spot, mask)
+    second = _pixel_coverage(later, mask, spot)
     flow = ahead.astype(np.float64)
     for _ in range(_ROUNDS):
-        before = _shifted(mask, -ahead)
+        before = _shift_pixels(mask, -ahead)
         if before.sum() < mask.sum() or before[0].any() or before[:, 0].any():
             return _NOTHING
         if before[-1].any() or before[:, -1].any():
             return _NOTHING
-        first = _covered(earlier, before, spot)
-        found = _registered(_shifted(first, ahead), second, noise / spot.level)
+        first = _pixel_coverage(earlier, before, spot)
+        found = _register_shift(_shift_pixels(first, ahead), second, noise / spot.level)
         flow = ahead + np.array(found[:2])
         whole = np.rint(flow)
         if not np.isfinite(whole).all() or np.abs(whole - ahead).max() > 2.0:
@@ -212,7 +213,9 @@ def _mask(later: FloatArray, spot: Spot, sought: BoolArray) -> Any:
     return None if mine == 0 else cv2.dilate((labels == mine).astype(np.uint8), _AROUND)
 
 
-def _whole_pixels(earlier: FloatArray, later: FloatArray, spot: Spot, mask: AnyArray) -> AnyArray:
+def _match_whole_pixels(
+    earlier: FloatArray, later: FloatArray, spot: Spot, mask: AnyArray
+) -> AnyArray:
     """Return how far the spot's pixels came, where they correlate best."""
     cv2 = opencv()
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
@@ -224,7 +227,7 @@ def _whole_pixels(earlier: FloatArray, later: FloatArray, spot: Spot, mask: AnyA
     return np.array([left - column, top - row])
 
 
-def _shifted(picture: AnyArray, by: AnyArray) -> AnyArray:
+def _shift_pixels(picture: AnyArray, by: AnyArray) -> AnyArray:
     """Return a picture moved by whole pixels, x and y; what comes in is 0."""
     moved = np.zeros_like(picture)
     (x, y), (rows, columns) = by.tolist(), picture.shape
@@ -234,7 +237,7 @@ def _shifted(picture: AnyArray, by: AnyArray) -> AnyArray:
     return moved
 
 
-def _covered(picture: FloatArray, mask: AnyArray, spot: Spot) -> FloatArray:
+def _pixel_coverage(picture: FloatArray, mask: AnyArray, spot: Spot) -> FloatArray:
     """Return the share of each pixel that the target covers; 0 beyond what is its own.
 
     A pixel is partly the target's and partly the background's: the background counts less the more
@@ -244,13 +247,13 @@ def _covered(picture: FloatArray, mask: AnyArray, spot: Spot) -> FloatArray:
     own = cv2.dilate(mask, _AROUND)
     behind: Any = np.full_like(picture, spot.behind)
     if spot.cluttered:
-        behind = _behind(picture, own, spot.behind)
+        behind = _interpolate_background(picture, own, spot.behind)
     level = float(cv2.GaussianBlur(picture, (0, 0), 0.5)[mask > 0].max(initial=-math.inf))
     share = (picture - behind) / np.maximum(level - behind, 0.3 * spot.level)
     return np.asarray(np.where((mask if spot.cluttered else own) > 0, share, 0.0))
 
 
-def _behind(picture: FloatArray, own: AnyArray, level: float) -> FloatArray:
+def _interpolate_background(picture: FloatArray, own: AnyArray, level: float) -> FloatArray:
     """Return the background, carried on behind the target as smoothly as what is beside it lets."""
     cv2 = opencv()
     outside = 1.0 - own.astype(np.float64)
@@ -263,7 +266,7 @@ def _behind(picture: FloatArray, own: AnyArray, level: float) -> FloatArray:
     return filled + level
 
 
-def _registered(first: FloatArray, second: FloatArray, noise: float) -> Flow:
+def _register_shift(first: FloatArray, second: FloatArray, noise: float) -> Flow:
     """Return by how much less than a pixel or so the second picture is shifted against the first.
 
     The correlation is that of both, smoothed by `_SMOOTH`: the sharpest detail is not sampled

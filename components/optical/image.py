@@ -14,9 +14,9 @@ from components.messages.detections import EXTRAS, Detections
 from components.optical.flow import find_spot, opencv, spot_flow
 from components.optical.picture import (
     Pinhole,
-    angles_over,
-    as_grey,
     background,
+    grey_levels,
+    patch_angles,
     target_outlines,
     union_coverage,
 )
@@ -111,7 +111,7 @@ class _View(NamedTuple):
 
 
 def _confidence(camera: Any, cells: Cells) -> dict[str, FloatArray]:
-    """Return how far each target stands above the threshold, in the threshold's unit."""
+    """Return each target's margin above the threshold, in the threshold's unit."""
     return {"confidence": camera.look(cells).confidence}
 
 
@@ -178,7 +178,7 @@ class ImageCamera(ElectroOptical):
             keys = cells.roster.keys_of(cells.target)
             in_frame = self.pinhole.holds(now.column, now.row)
             for cell in np.flatnonzero(in_frame).tolist():
-                seen = self._seen(
+                seen = self._measure_cell(
                     cells, cell, now, before, bool(there[cell]), [o[cell] for o in outlines],
                     float(contrast[cell]), keys[cell : cell + 1],
                 )  # fmt: skip
@@ -222,10 +222,10 @@ class ImageCamera(ElectroOptical):
             cells.relative_heading_rad, cells.target_pitch_rad, cells.target_roll_rad,
             cells.elevation_rad, front, side, flat, None,
         )  # fmt: skip
-        size = np.sqrt(self.shown_area(cells) / np.where(union > 0.0, union, np.inf))
+        size = np.sqrt(self.visible_area_m2(cells) / np.where(union > 0.0, union, np.inf))
         return [size[:, np.newaxis, np.newaxis] * (place(one) - middle) for one in drawn]
 
-    def _seen(
+    def _measure_cell(
         self,
         cells: Cells,
         cell: int,
@@ -326,10 +326,11 @@ class ImageCamera(ElectroOptical):
         side = 2 * scene.half
         at = (corner + scene.half) * scene.binned
         ahead, right, down = (
-            self._ned_angles(at + side * np.array(by), attitude) for by in ((0, 0), (1, 0), (0, 1))
+            self._pixel_to_ned(at + side * np.array(by), attitude)
+            for by in ((0, 0), (1, 0), (0, 1))
         )
         offset: Any = (np.arange(side) + 0.5 - scene.half) * (scene.binned / side)
-        azimuth, elevation = angles_over(ahead, right, down, offset)
+        azimuth, elevation = patch_angles(ahead, right, down, offset)
         run = int(scene.cells.run[scene.cell])
 
         def normal(one: IntArray, other: IntArray) -> FloatArray:
@@ -339,7 +340,7 @@ class ImageCamera(ElectroOptical):
         grain = self.p.texture_pixels * self.pixel_azimuth_rad
         return background(normal, azimuth, elevation, grain)
 
-    def _ned_angles(self, pixel: AnyArray, attitude: Any) -> FloatArray:
+    def _pixel_to_ned(self, pixel: AnyArray, attitude: Any) -> FloatArray:
         x, y, z = self._direction(pixel, attitude)
         return np.array([math.atan2(y, x), math.atan2(-z, math.hypot(x, y))])
 
@@ -356,11 +357,11 @@ class ImageCamera(ElectroOptical):
     def _keep(self, cells: Cells, cell: int, picture: FloatArray) -> None:
         """Keep the middle of a patch to be shown."""
         tick = int(cells.scan_ticks[cells.row[cell]])
-        self.patches[int(cells.target[cell]), tick] = as_grey(picture, SHOWN)
+        self.patches[int(cells.target[cell]), tick] = grey_levels(picture, SHOWN)
         while len(self.patches) > _KEPT:
             del self.patches[next(iter(self.patches))]
 
-    def _measured(
+    def _measure(
         self, cells: Cells, detected: IntArray, look: Look, azimuth_rad: FloatArray,
         elevation_rad: FloatArray, range_m: FloatArray,
     ) -> Any:  # fmt: skip
@@ -370,7 +371,7 @@ class ImageCamera(ElectroOptical):
         known = np.isfinite(column)
         azimuth_rad = np.where(known, seen[0], azimuth_rad)
         elevation_rad = np.where(known, seen[1], elevation_rad)
-        return super()._measured(cells, detected, look, azimuth_rad, elevation_rad, range_m)
+        return super()._measure(cells, detected, look, azimuth_rad, elevation_rad, range_m)
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return what the picture says of each cell."""

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.aircraft.known_targets import known_targets
-from components.arguments.checks import angle, broadcast_flat, not_negative, unflatten
+from components.arguments.checks import angle, broadcast_flat, check_not_negative, unflatten
 from components.optical.silhouette import line_of_sight_in_target_axes, visible_area
-from components.sensor.look import Cells, CellValues, turned_to_sight
+from components.sensor.look import Cells, CellValues, aspect_angles_of_cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
@@ -47,8 +47,8 @@ def plume_area(
         pitch_rad=angle("pitch_rad", pitch_rad),
         roll_rad=angle("roll_rad", roll_rad),
         elevation_rad=angle("elevation_rad", elevation_rad),
-        back_m2=not_negative("back_m2", back_m2),
-        plume_share_of_back=not_negative("plume_share_of_back", share),
+        back_m2=check_not_negative("back_m2", back_m2),
+        plume_share_of_back=check_not_negative("plume_share_of_back", share),
     )
     cos_off_nose, _, _, _ = line_of_sight_in_target_axes(heading, pitch, roll, elevation)
     return unflatten(shares * back * np.clip(0.5 + 0.5 * cos_off_nose, 0.0, 1.0), shape)
@@ -138,7 +138,7 @@ class Plume(Effect[CellValues]):
                     continue
                 chosen = np.flatnonzero(engines == engine)
                 area[chosen] = plume_area(
-                    *turned_to_sight(cells, chosen),
+                    *aspect_angles_of_cells(cells, chosen),
                     back_m2=back[chosen],
                     engine=engine,
                     plume_share_of_back=shares[engine],

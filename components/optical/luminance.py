@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from components.arguments.checks import (
     angle,
     broadcast_flat,
+    check_not_negative,
     finite,
-    not_negative,
     positive,
     refuse,
     unflatten,
@@ -163,7 +163,7 @@ BACKGROUNDS = ("sky", "ground", "auto")
 
 def inherent_contrast(target_cd_m2: ArrayLike, background_cd_m2: ArrayLike) -> Any:
     """Give the contrast at the target, |Lt - Lb| / Lb."""
-    target = not_negative("target_cd_m2", target_cd_m2)
+    target = check_not_negative("target_cd_m2", target_cd_m2)
     behind = positive("background_cd_m2", background_cd_m2)
     return np.abs(target - behind) / behind
 

@@ -15,7 +15,7 @@ from components.aircraft.aspect_tables import SilhouetteTable
 from components.arguments.checks import finite
 from dsa_des.arrays.types import FloatArray
 from dsa_des.files.input_files import InputFileError, status_of
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 DEFAULT_ROWS = 1024
 
@@ -168,7 +168,7 @@ def load_mesh(
         raise ValueError(f"{path} {error}") from None
     # A reader of a dozen formats says "this is no mesh" with a dozen kinds of exceptions.
     except Exception as error:
-        reason = shortened(" ".join(str(error).split()), 200) or type(error).__name__
+        reason = shorten(" ".join(str(error).split()), 200) or type(error).__name__
         raise ValueError(f"{path} is not a mesh that can be read: {reason}") from None
     vertices = np.empty((len(loaded.vertices), 3))
     for column, letter in enumerate(axes):

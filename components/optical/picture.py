@@ -55,7 +55,7 @@ class Pinhole:
             )
 
     @classmethod
-    def calibrated(
+    def from_intrinsics(
         cls,
         focal_px: tuple[float, float],
         principal_px: tuple[float, float],
@@ -265,7 +265,7 @@ def union_coverage(
     return np.clip(total / steps, 0.0, 1.0)
 
 
-def as_grey(picture: FloatArray, most: int) -> Any:
+def grey_levels(picture: FloatArray, most: int) -> Any:
     """Return a patch to be shown, eight bits a pixel, at most so many pixels wide."""
     largest = max(float(np.abs(picture).max()), 1e-12)
     grey = np.clip(128.0 - 120.0 * picture / largest, 0.0, 255.0).astype(np.uint8)
@@ -273,7 +273,7 @@ def as_grey(picture: FloatArray, most: int) -> Any:
     return grey[::step, ::step]
 
 
-def angles_over(
+def patch_angles(
     middle: FloatArray, right: FloatArray, down: FloatArray, offset: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return azimuths and elevations over a patch, linear in its pixels.

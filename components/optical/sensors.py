@@ -14,8 +14,8 @@ from components.optical.infrared_area import AREA, Plume
 from components.optical.silhouette import union_area
 from components.optical.weather_effects import BandExtinction, Night
 from components.sensor.cued_looks import refuse_cues
-from components.sensor.ladder_values import over_cells
-from components.sensor.look import Cells, Look, turned_to_sight
+from components.sensor.ladder_values import evaluate_over_cells
+from components.sensor.look import Cells, Look, aspect_angles_of_cells
 from components.sensor.marks import EO, IR
 from components.sensor.parameters import CorrelationTime, ErrorParameters, SensorParameters
 from components.sensor.sensor import CUED_INPUTS, Sensor
@@ -35,7 +35,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     the reference.
     """
     camera: Any = block
-    if not hasattr(camera, "shown_area"):
+    if not hasattr(camera, "visible_area_m2"):
         as_camera: Any = reference
 
         def values(cells: Cells) -> dict[str, FloatArray]:
@@ -51,9 +51,9 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     else:
 
         def values(cells: Cells) -> dict[str, FloatArray]:
-            return {_AREA.name: camera.shown_area(cells)}
+            return {_AREA.name: camera.visible_area_m2(cells)}
 
-    return dict(over_cells(camera, wake, values))
+    return dict(evaluate_over_cells(camera, wake, values))
 
 
 def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
@@ -69,13 +69,13 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
         names = ["front_m2", "side_m2", "horizontal_m2"]
         names += ["back_m2"] if camera.areas == "ir" else []
         bodies = [cells.of_target(roster.column(f"{camera.areas}.{name}")) for name in names]
-        wide = [array.astype(np.longdouble) for array in (*turned_to_sight(cells), *bodies)]
+        wide = [array.astype(np.longdouble) for array in (*aspect_angles_of_cells(cells), *bodies)]
         areas: Any = (*wide, None)[:8]
         exact = union_area(*areas)
-        error = np.abs(camera.shown_area(cells).astype(np.longdouble) - exact)
+        error = np.abs(camera.visible_area_m2(cells).astype(np.longdouble) - exact)
         return {_AREA.name: error.astype(np.float64)}
 
-    found = over_cells(camera, wake, values)
+    found = evaluate_over_cells(camera, wake, values)
     return {_AREA.name: found[_AREA.name][cells[:, 0], cells[:, 1]]}
 
 
@@ -299,7 +299,7 @@ class CameraBoundaryParameters(SensorParameters):
     )
 
     @model_validator(mode="after")
-    def _errs_by_chance(self) -> Self:
+    def _check_error_model(self) -> Self:
         if self.range_bias_share and not self.range_error_share:
             raise ValueError(
                 f"range_bias_share is {self.range_bias_share:g} and range_error_share is 0: no "

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from components.arguments.checks import (
     angle,
     broadcast_flat,
+    check_not_negative,
     finite,
-    not_negative,
     positive,
     unflatten,
 )
@@ -101,8 +101,8 @@ def pixels_covered(
     (errata 10). At range 0 a target of any area fills the sensor.
     """
     shape, (area, distance, across, upward, most) = broadcast_flat(
-        area_m2=not_negative("area_m2", area_m2),
-        range_m=not_negative("range_m", range_m),
+        area_m2=check_not_negative("area_m2", area_m2),
+        range_m=check_not_negative("range_m", range_m),
         pixel_azimuth_rad=positive("pixel_azimuth_rad", pixel_azimuth_rad),
         pixel_elevation_rad=positive("pixel_elevation_rad", pixel_elevation_rad),
         sensor_pixels=positive("sensor_pixels", sensor_pixels),
@@ -158,10 +158,12 @@ def total_signature(
         If an argument is negative or not finite.
     """
     return (
-        not_negative("static_weight", static_weight)
-        * not_negative("pixels", pixels)
-        * not_negative("contrast_gain", contrast_gain)
-    ) + not_negative("dynamic_weight", dynamic_weight) * not_negative("rate_rad_s", rate_rad_s)
+        check_not_negative("static_weight", static_weight)
+        * check_not_negative("pixels", pixels)
+        * check_not_negative("contrast_gain", contrast_gain)
+    ) + check_not_negative("dynamic_weight", dynamic_weight) * check_not_negative(
+        "rate_rad_s", rate_rad_s
+    )
 
 
 def confidence(signature: ArrayLike, threshold: ArrayLike = 1.0) -> Any:
@@ -193,12 +195,12 @@ def detection_range(
     """
     pixels = np.float64(1.0) if sensor_pixels is None else positive("sensor_pixels", sensor_pixels)
     shape, flat = broadcast_flat(
-        area_m2=not_negative("area_m2", area_m2),
+        area_m2=check_not_negative("area_m2", area_m2),
         pixel_azimuth_rad=positive("pixel_azimuth_rad", pixel_azimuth_rad),
         pixel_elevation_rad=positive("pixel_elevation_rad", pixel_elevation_rad),
-        contrast_gain=not_negative("contrast_gain", contrast_gain),
-        static_weight=not_negative("static_weight", static_weight),
-        dynamic_signature=not_negative("dynamic_signature", dynamic_signature),
+        contrast_gain=check_not_negative("contrast_gain", contrast_gain),
+        static_weight=check_not_negative("static_weight", static_weight),
+        dynamic_signature=check_not_negative("dynamic_signature", dynamic_signature),
         threshold=finite("threshold", threshold),
         sensor_pixels=np.asarray(pixels),
     )

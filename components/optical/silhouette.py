@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import angle, broadcast_flat, not_negative, unflatten
+from components.arguments.checks import angle, broadcast_flat, check_not_negative, unflatten
 from components.geometry import sine_and_cosine
 from dsa_des.arrays.column_values import one_row
 from dsa_des.arrays.types import FloatArray
@@ -307,9 +307,9 @@ def visible_area(
     ):
         if value is None:
             raise ValueError(f"{name} is missing: model {model!r} needs it, in square metres")
-        areas[name] = not_negative(name, value)
+        areas[name] = check_not_negative(name, value)
     if back_m2 is not None:
-        areas["back_m2"] = not_negative("back_m2", back_m2)
+        areas["back_m2"] = check_not_negative("back_m2", back_m2)
     shape, flat = broadcast_flat(**angles, **areas)
     heading, pitch, roll, elevation, front, side, horizontal = flat[:7]
     back = flat[7] if back_m2 is not None else None

@@ -45,8 +45,8 @@ class Visibility(Effect[CellValues]):
     def verdict(self, block: Any) -> Verdict:
         """Ask ``[weather]`` for a visibility, fog or rain."""
         weather = block.context.sections["weather"]
-        if own_band(block) is not None:
-            return Verdict(False, f"{_band_said(block)}: the air takes what it takes there")
+        if infrared_band_of(block) is not None:
+            return Verdict(False, f"{_describe_band(block)}: the air takes what it takes there")
         if weather.visibility_km is not None:
             return Verdict(True, f"[weather] visibility_km is {weather.visibility_km:g}")
         found = [
@@ -64,7 +64,7 @@ class Visibility(Effect[CellValues]):
     def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's contrast."""
         visibility_m = scene_visibility_m(block.context.sections["weather"])
-        if visibility_m is None or own_band(block) is not None:
+        if visibility_m is None or infrared_band_of(block) is not None:
             return lambda cells: np.ones(len(cells))
 
         def factor(cells: Cells) -> FloatArray:
@@ -81,11 +81,11 @@ class BandExtinction(Effect[CellValues]):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for ``extinction_band``."""
-        return Verdict(own_band(block) is not None, _band_said(block))
+        return Verdict(infrared_band_of(block) is not None, _describe_band(block))
 
     def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's contrast."""
-        band = own_band(block)
+        band = infrared_band_of(block)
         if band is None:
             return lambda cells: np.ones(len(cells))
         weather = block.context.sections["weather"]
@@ -131,7 +131,7 @@ class ObscuringCells(Effect[CellValues]):
                 rain = share_between(low, high, -math.inf, weather.rain_top_m)
                 fog = share_between(low, high, weather.fog_base_m, weather.fog_top_m)
                 per_m = rain * float(rain_extinction_per_m(one.rain_rate_mm_h))
-                per_m += fog * _fog_per_m(own_band(block), one.fog_water_g_m3)
+                per_m += fog * _fog_per_m(infrared_band_of(block), one.fog_water_g_m3)
                 depth += per_m * cells.range_m * (within.leaves - within.enters)
             with np.errstate(under="ignore"):
                 return np.exp(-depth)
@@ -171,11 +171,11 @@ class Night(Effect[bool]):
         return True
 
 
-def _band_said(block: Any) -> str:
+def _describe_band(block: Any) -> str:
     return f"extinction_band is {block.p.extinction_band!r}"
 
 
-def own_band(block: Any) -> str | None:
+def infrared_band_of(block: Any) -> str | None:
     """Return the infrared band of a camera whose air is that of its band, or None."""
     band = getattr(block.p, "extinction_band", None)
     return band if band in BANDS else None

@@ -55,7 +55,7 @@ def illumination_offset_s(
     positive("scan_period_s", scan_period_s)
     start = float(finite("start_rad", start_rad))
     azimuth = np.asarray(finite("azimuth_rad", azimuth_rad))
-    swept = _into_sweep(azimuth - start, width_rad)
+    swept = _clip_to_sweep(azimuth - start, width_rad)
     return np.minimum(swept / (width_rad / scan_period_s), scan_period_s)[()]
 
 
@@ -123,14 +123,14 @@ def two_way_gain(off_axis_rad: FloatArray, beamwidth_rad: float) -> FloatArray:
     return share
 
 
-def off_nearest(angle_rad: FloatArray, width_rad: float, beams: int) -> FloatArray:
+def angle_off_nearest_beam(angle_rad: FloatArray, width_rad: float, beams: int) -> FloatArray:
     """Return how far an angle from the edge is off the nearest beam, where beams share a width."""
     step = width_rad / beams
     number = np.clip(np.floor(angle_rad / step), 0, beams - 1)
     return np.asarray(angle_rad - (number + 0.5) * step)
 
 
-def _into_sweep(angle: FloatArray, width: float) -> FloatArray:
+def _clip_to_sweep(angle: FloatArray, width: float) -> FloatArray:
     """Return the angle clockwise from the start, [0, width]; outside, the nearer edge."""
     angle = np.mod(angle, TWO_PI)
     past_the_end = angle > width
@@ -163,12 +163,14 @@ class OffAxis:
             cells.body_azimuth_rad, cells.body_elevation_rad
         )
         swept = np.mod(azimuth_rad - self._columns[0], TWO_PI)
-        left = two_way_gain(off_nearest(elevation_rad - self._bars[0], *self._bars[1:]),
+        left = two_way_gain(angle_off_nearest_beam(elevation_rad - self._bars[0], *self._bars[1:]),
                             self._beam_rad[1])  # fmt: skip
         if self._block.p.beam_sweep:
             left = left * SWEEP_SHARE
         else:
-            left = left * two_way_gain(off_nearest(swept, *self._columns[1:]), self._beam_rad[0])
+            left = left * two_way_gain(
+                angle_off_nearest_beam(swept, *self._columns[1:]), self._beam_rad[0]
+            )
         return np.where(cells.is_cued(), 1.0, left)
 
 
@@ -330,7 +332,7 @@ class SweepingSensor(Sensor):
             return reach
         return replace(farthest_look([reach]), lasts_s=self._sweep.period_s)
 
-    def seen(
+    def see_targets(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
     ) -> tuple[RelativeTargets, IntArray]:
         """Return the targets at the instants at which the beam lights them."""

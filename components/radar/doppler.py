@@ -30,10 +30,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
-    as_numbers,
     broadcast_flat,
+    check_not_negative,
+    check_numbers,
     finite,
-    not_negative,
     one_of,
     positive,
     refuse,
@@ -71,7 +71,7 @@ class MovingTargetFilter:
         positive("prf_hz", self.prf_hz)
         positive("wavelength_m", self.wavelength_m)
         if self.notch_m_s is not None:
-            not_negative("notch_m_s", self.notch_m_s)
+            check_not_negative("notch_m_s", self.notch_m_s)
         if not FEWEST_PULSES <= self.pulses <= MOST_PULSES:
             raise ValueError(
                 f"pulses is {self.pulses}: it must be from {FEWEST_PULSES} to {MOST_PULSES}"
@@ -89,7 +89,7 @@ class MovingTargetFilter:
 
     @property
     def unambiguous_m_s(self) -> float:
-        """Largest size λ·PRF/4 of a range rate that is told from all smaller ones."""
+        """Largest unambiguous range rate, λ·PRF/4."""
         return 0.25 * self.wavelength_m * self.prf_hz
 
     @property
@@ -117,7 +117,7 @@ class MovingTargetFilter:
         shape, (target, clutter, spread) = broadcast_flat(
             target_m_s=finite("target_m_s", target_m_s),
             clutter_m_s=finite("clutter_m_s", clutter_m_s),
-            spread_m_s=not_negative("spread_m_s", spread_m_s),
+            spread_m_s=check_not_negative("spread_m_s", spread_m_s),
         )
         # Cycles of the echo's phase from pulse to pulse.
         per_m_s = 1.0 / self.blind_speed_m_s
@@ -177,10 +177,10 @@ def folded_range_rate(range_rate_m_s: ArrayLike, unambiguous_m_s: ArrayLike) -> 
 
     In [-unambiguous, unambiguous), off by a multiple of twice that; NaN stays NaN.
     """
-    limit = as_numbers("unambiguous_m_s", unambiguous_m_s)
+    limit = check_numbers("unambiguous_m_s", unambiguous_m_s)
     refuse("unambiguous_m_s", limit, ~(limit > 0.0), "be above 0")
     shape, (rate, limit) = broadcast_flat(
-        range_rate_m_s=as_numbers("range_rate_m_s", range_rate_m_s), unambiguous_m_s=limit
+        range_rate_m_s=check_numbers("range_rate_m_s", range_rate_m_s), unambiguous_m_s=limit
     )
     return unflatten(np.mod(rate + limit, 2.0 * limit) - limit, shape)
 

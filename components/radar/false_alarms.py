@@ -9,7 +9,7 @@ import numpy as np
 
 from components.geometry import Vector, body_to_ned, unit_vector
 from components.messages.detections import REPORT, Detections, Reporting
-from components.messages.false_detections import in_measured_order
+from components.messages.false_detections import sort_by_measurement
 from components.messages.targets import RelativeTargets
 from components.radar.detection.clutter import clutter_detection_probability
 from components.radar.detection.output import false_alarm_count, false_alarm_snr
@@ -68,7 +68,7 @@ class NoiseReports:
         """Return the report with the false alarms of its scans."""
         for which, crossing in enumerate(self._crossings):
             detections = self._with_alarms(detections, targets, rows, crossing, which)
-        return in_measured_order(detections)
+        return sort_by_measurement(detections)
 
     def _with_alarms(
         self,
@@ -94,9 +94,9 @@ class NoiseReports:
         scan, places = detections.scan[row], self._places.of_runs(detections.run[row], now_ns[row])
         across, upwards, outwards, power = (places.uniform(key, scan, draw) for draw in range(4))
         where = {
-            "azimuth": _between(across, self._cells.azimuth_rad),
-            "elevation": _between(upwards, self._cells.elevation_rad),
-            "range": _between(outwards, self._cells.range_m),
+            "azimuth": _scale_to_field(across, self._cells.azimuth_rad),
+            "elevation": _scale_to_field(upwards, self._cells.elevation_rad),
+            "range": _scale_to_field(outwards, self._cells.range_m),
         }
         snr = false_alarm_snr(
             power,
@@ -135,7 +135,7 @@ class FalseAlarms(Effect[Reporting]):
         return Verdict.of_flag(block.p, "false_alarms")
 
 
-def _between(uniform: Any, field: tuple[float, float]) -> Any:
+def _scale_to_field(uniform: Any, field: tuple[float, float]) -> Any:
     start, width = field
     return start + width * uniform
 
@@ -228,7 +228,7 @@ class GroundReports:
             detections, targets, rows, row, where, key=key + _OF_GROUND, snr=snr, rate=rate
         )
         # Without any here, the report is in that order already.
-        return in_measured_order(joined)
+        return sort_by_measurement(joined)
 
     def _of_scan(
         self, targets: RelativeTargets, row: int, run: int, scan: int
@@ -291,7 +291,7 @@ class GroundReports:
                 alt_m = np.full(len(range_m), self._terrain.height_m)
             cells: Any = _CellsWithoutTarget(range_m, own_alt_m, elevation_rad, alt_m)
             powers.append(self._block.echo_snr(cells, echo(cells)))
-        clutter = Clutter.summed(echoes, powers, len(range_m))
+        clutter = Clutter.sum_echoes(echoes, powers, len(range_m))
         pfa = clutter_detection_probability(
             0.0,
             clutter.mean,

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
-    as_numbers,
     broadcast_flat,
+    check_not_negative,
+    check_numbers,
     finite,
-    not_negative,
     positive,
     refuse,
     unflatten,
@@ -77,14 +77,14 @@ def ground_clutter_rcs_m2(
         ("range_resolution_m", range_resolution_m),
     ):
         positive(name, value)
-    reflectivity = as_numbers("gamma_db", gamma_db)
+    reflectivity = check_numbers("gamma_db", gamma_db)
     refuse("gamma_db", reflectivity, ~(np.abs(reflectivity) <= 100.0), "lie in ±100 dB")
     shape, (distance, elevation, height) = broadcast_flat(
-        range_m=not_negative("range_m", range_m),
+        range_m=check_not_negative("range_m", range_m),
         elevation_rad=finite("elevation_rad", elevation_rad),
         height_m=positive("height_m", height_m),
     )
-    sine = np.minimum(height, distance) / _or_height(distance, height)
+    sine = np.minimum(height, distance) / _distance_or_height(distance, height)
     grazing = np.arcsin(sine)
     off_axis = (elevation + grazing) / elevation_beamwidth_rad
     lit = (distance >= height) & (np.abs(off_axis) <= BEAM_REACH_BEAMWIDTHS)
@@ -110,9 +110,9 @@ def ground_ring_rcs_m2(
     """
     positive("range_resolution_m", range_resolution_m)
     shape, (distance, height) = broadcast_flat(
-        range_m=not_negative("range_m", range_m), height_m=positive("height_m", height_m)
+        range_m=check_not_negative("range_m", range_m), height_m=positive("height_m", height_m)
     )
-    sine = np.minimum(height, distance) / _or_height(distance, height)
+    sine = np.minimum(height, distance) / _distance_or_height(distance, height)
     area = 2.0 * math.pi * distance * range_resolution_m
     rcs = 10.0 ** (0.1 * float(gamma_db)) * sine * area
     return unflatten(np.where(distance >= height, rcs, 0.0), shape)
@@ -136,7 +136,7 @@ def altitude_line_rcs_m2(
     edges; over all of it pi h² ρ², the RCS of a mirror below whatever its roughness.
     """
     shape, (distance, height) = broadcast_flat(
-        range_m=not_negative("range_m", range_m), height_m=positive("height_m", height_m)
+        range_m=check_not_negative("range_m", range_m), height_m=positive("height_m", height_m)
     )
     half_m = 0.5 * float(positive("range_resolution_m", range_resolution_m))
     slope_m = height * math.tan(slope_rad)
@@ -147,7 +147,7 @@ def altitude_line_rcs_m2(
     return unflatten(math.pi * height**2 * reflectivity * share, shape)
 
 
-def _or_height(distance: Any, height: Any) -> Any:
+def _distance_or_height(distance: Any, height: Any) -> Any:
     """Return the distance, or the height where the distance is 0 (no division by 0)."""
     return np.where(distance > 0.0, distance, height)
 
@@ -166,7 +166,9 @@ class Clutter:
     diffuse: FloatArray
 
     @classmethod
-    def summed(cls, echoes: Sequence[Echo], powers: Iterable[FloatArray], cells: int) -> Clutter:
+    def sum_echoes(
+        cls, echoes: Sequence[Echo], powers: Iterable[FloatArray], cells: int
+    ) -> Clutter:
         """Return the clutter of echoes with these powers over noise."""
         mean, diffuse = np.zeros(cells), np.zeros(cells)
         for echo, power in zip(echoes, powers, strict=True):
@@ -351,7 +353,7 @@ def platform_spread_m_s(
     """
     positive("beamwidth_rad", beamwidth_rad)
     shape, (speed, rate) = broadcast_flat(
-        speed_m_s=not_negative("speed_m_s", speed_m_s),
+        speed_m_s=check_not_negative("speed_m_s", speed_m_s),
         ground_rate_m_s=finite("ground_rate_m_s", ground_rate_m_s),
     )
     across = np.sqrt(np.maximum((speed - rate) * (speed + rate), 0.0))

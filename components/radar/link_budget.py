@@ -14,8 +14,8 @@ from components.aircraft.aspect_tables import dbsm_to_m2
 from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
+    check_not_negative,
     finite,
-    not_negative,
     positive,
     refuse,
     unflatten,
@@ -116,7 +116,8 @@ class LinkBudget:
     def snr(self, range_m: ArrayLike, rcs_m2: ArrayLike) -> Any:
         """Return the SNR per look (linear) at slant ranges for RCSs, 0 closer than `nearest_m`."""
         shape, (distance, rcs) = broadcast_flat(
-            range_m=not_negative("range_m", range_m), rcs_m2=not_negative("rcs_m2", rcs_m2)
+            range_m=check_not_negative("range_m", range_m),
+            rcs_m2=check_not_negative("rcs_m2", rcs_m2),
         )
         return unflatten(self.snr_of_cells(distance, rcs), shape)
 
@@ -142,7 +143,7 @@ class LinkBudget:
         The equation alone: where the result is below `nearest_m`, the radar processes no echo.
         """
         shape, (ratio, rcs) = broadcast_flat(
-            snr=positive("snr", snr), rcs_m2=not_negative("rcs_m2", rcs_m2)
+            snr=positive("snr", snr), rcs_m2=check_not_negative("rcs_m2", rcs_m2)
         )
         with np.errstate(under="ignore", over="ignore"):  # ends of the number range
             fourth = self.constant_m2 * rcs / ratio

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from components.arguments.checks import not_negative, positive
-from components.geometry import NEAR_A_POLE_DEG, turned_by_meridians
+from components.arguments.checks import check_not_negative, positive
+from components.geometry import NEAR_A_POLE_DEG, rotate_to_meridian
 from components.messages.columns import OWN_VELOCITY
 from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.targets import RelativeTargets, own_velocity
@@ -43,9 +43,9 @@ def angle_variance(
     width = float(positive("beamwidth_rad", beamwidth_rad))
     ratio = _ratio(energy_ratio)
     if method == "monopulse":
-        return _limited(width, ratio, MONOPULSE_SLOPE)
+        return _limit_deviation(width, ratio, MONOPULSE_SLOPE)
     if method == "scan":
-        return _limited(width, ratio / SCAN_BEAMSHAPE_LOSS, SCAN_SLOPE)
+        return _limit_deviation(width, ratio / SCAN_BEAMSHAPE_LOSS, SCAN_SLOPE)
     raise ValueError(f"method is {method!r}: it must be 'monopulse' or 'scan'")
 
 
@@ -57,7 +57,9 @@ def range_variance(range_resolution_m: float, energy_ratio: FloatArray) -> Float
     Skolnik, Theoretical accuracy of radar measurements, IRE Trans. ANE-7, 1960, would be smaller by
     sqrt(3) / pi, which a receiver with weighting does not reach.
     """
-    return _limited(float(positive("range_resolution_m", range_resolution_m)), _ratio(energy_ratio))
+    return _limit_deviation(
+        float(positive("range_resolution_m", range_resolution_m)), _ratio(energy_ratio)
+    )
 
 
 def range_rate_variance(range_rate_resolution_m_s: float, energy_ratio: FloatArray) -> FloatArray:
@@ -67,15 +69,15 @@ def range_rate_variance(range_rate_resolution_m_s: float, energy_ratio: FloatArr
     8.3.
     """
     step = float(positive("range_rate_resolution_m_s", range_rate_resolution_m_s))
-    return _limited(step, _ratio(energy_ratio))
+    return _limit_deviation(step, _ratio(energy_ratio))
 
 
 def _ratio(energy_ratio: FloatArray) -> FloatArray:
-    ratio: FloatArray = np.asarray(not_negative("energy_ratio", energy_ratio))
+    ratio: FloatArray = np.asarray(check_not_negative("energy_ratio", energy_ratio))
     return ratio
 
 
-def _limited(width: float, ratio: FloatArray, slope: float = 1.0) -> FloatArray:
+def _limit_deviation(width: float, ratio: FloatArray, slope: float = 1.0) -> FloatArray:
     least = 1.0 / (2.0 * slope**2 * _UNIFORM)
     variance: FloatArray = width**2 / (2.0 * slope**2 * np.maximum(ratio, least))
     return variance
@@ -178,7 +180,7 @@ class Strength:
             for model, chosen in block.models_in_use(cells):
                 some = part
                 if not isinstance(chosen, slice):  # else one model for all
-                    some = part[_within(detected[part], chosen, len(cells))]
+                    some = part[_is_chosen(detected[part], chosen, len(cells))]
                 output = 1.0 + measured_snr(
                     tail[some],
                     mean[some],
@@ -218,7 +220,7 @@ class MeasuredStrength(Effect[Strengthening]):
         return Verdict(True, "a radar measures strength as it measures places")
 
 
-def _within(cells: IntArray, chosen: IntArray, count: int) -> IntArray:
+def _is_chosen(cells: IntArray, chosen: IntArray, count: int) -> IntArray:
     """Return which of some cells are among the chosen ones."""
     inside = np.zeros(count, dtype=bool)
     inside[chosen] = True
@@ -284,5 +286,5 @@ def _from_believed_north(
     place = believed["lat_deg"][row], believed["lon_deg"][row]
     if not (np.abs(place[0]) > NEAR_A_POLE_DEG).any():
         return velocity
-    own = flights.own_at(row, time_s)
-    return turned_by_meridians(velocity, (own.lat_deg, own.lon_deg), place)
+    own = flights.ownship_states(row, time_s)
+    return rotate_to_meridian(velocity, (own.lat_deg, own.lon_deg), place)

@@ -98,7 +98,7 @@ class Radar(SweepingSensor):
         self.cfar = self.built_one(REFERENCE_CELLS)
         self._merging = self.built_one(ONE_REPORT)
 
-    def resolved(self, cells: Cells, power: FloatArray) -> FloatArray:
+    def resolve_echoes(self, cells: Cells, power: FloatArray) -> FloatArray:
         """Return the power of each echo that the radar can tell from others, and 0 of the rest."""
         return power if self._merging is None else self._merging(cells, power)
 
@@ -107,7 +107,7 @@ class Radar(SweepingSensor):
         seeming: Any = self.built_one(SEEMING_RANGE)
         return range_m if seeming is None else np.asarray(seeming(np.asarray(range_m)))
 
-    def filtered(
+    def filter_echoes(
         self, cells: Cells, signal: FloatArray, beside: list[FloatArray]
     ) -> tuple[FloatArray, list[FloatArray]]:
         """Return powers of targets and of the echoes behind the filter, where there is one."""
@@ -149,11 +149,11 @@ class Radar(SweepingSensor):
         """Return the true range rates of some cells, m/s; None where they are not measured."""
         return None if self._rates is None else self._rates(cells, detected)
 
-    def _in_body(
+    def _to_body_axes(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
         """Return what is measured, range rates as one PRF takes them where they fold."""
-        azimuth, elevation, range_m, beside = super()._in_body(values, variances)
+        azimuth, elevation, range_m, beside = super()._to_body_axes(values, variances)
         if self.p.range_rate_folds and "range_rate_m_s" in beside:
             assert self.wavelength_m is not None
             limit_m_s = 0.25 * self.wavelength_m * self.p.prf_hz
@@ -345,7 +345,7 @@ class RangeBoundary(Radar):
             detected = margin_db >= 0.0
         detected &= audible
         # Of equal targets the nearer one has the stronger echo.
-        detected &= self.resolved(cells, np.where(detected, ratio**4, 0.0)) > 0.0
+        detected &= self.resolve_echoes(cells, np.where(detected, ratio**4, 0.0)) > 0.0
         return Look(detected, margin_db)
 
     def _margin_db(
@@ -355,7 +355,7 @@ class RangeBoundary(Radar):
         p = self.p
         needed = required_snr(p.boundary_pd, false_alarm_probability=p.false_alarm_probability)
         noise = alone = 10.0 ** (-0.1 * over_noise_db)
-        signal, beside = self.filtered(cells, through, [through] * len(self.echoes))
+        signal, beside = self.filter_echoes(cells, through, [through] * len(self.echoes))
         for echo, left in zip(self.echoes, beside, strict=True):
             clutter = left * echo(cells) * 10.0 ** (-0.1 * p.boundary_rcs_dbsm)
             if p.clutter_threshold == "noise":

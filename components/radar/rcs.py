@@ -13,14 +13,14 @@ from components.aircraft.aircraft import Aircraft
 from components.aircraft.known_targets import known_targets
 from components.arguments.checks import (
     broadcast_flat,
-    checked_model,
+    check_model,
+    check_not_negative,
     finite,
-    not_negative,
     refuse,
     unflatten,
 )
 from components.geometry import aspect_angles, unit_vector
-from components.sensor.look import Cells, CellValues, turned_to_sight
+from components.sensor.look import Cells, CellValues, aspect_angles_of_cells
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Context
 from dsa_des.block.effect import Effect, Hook, Verdict
@@ -36,8 +36,8 @@ def fluctuating_rcs(mean_rcs_m2: ArrayLike, uniforms: ArrayLike, model: str) -> 
     Larger draws give larger RCS. Thesis eq. 22 with N = 1 (eq. 23: the exponential in power,
     Rayleigh in amplitude) and N = 2.
     """
-    name = checked_model(model)
-    mean, draw = not_negative("mean_rcs_m2", mean_rcs_m2), finite("uniforms", uniforms)
+    name = check_model(model)
+    mean, draw = check_not_negative("mean_rcs_m2", mean_rcs_m2), finite("uniforms", uniforms)
     refuse("uniforms", draw, ~((draw >= 0.0) & (draw < 1.0)), "lie in [0, 1)")
     if name in ("swerling2", "swerling4"):
         if draw.ndim == 0:
@@ -68,7 +68,7 @@ def scan_rcs(
     each pulse the sum of n pulses depends only on the sum of their SNR. So a steady target's Pd at
     the scan's RCS, averaged over scans, is the model's own Pd, whatever the pulses.
     """
-    name = checked_model(model)
+    name = check_model(model)
     if name == "swerling0":
         return np.array(mean_rcs_m2)
     if name in ("swerling1", "swerling3"):
@@ -84,7 +84,7 @@ def _aspect_angles(cells: Cells) -> tuple[FloatArray, FloatArray]:
     """Return from where each cell's target is seen, in its body axes."""
     # In a frame turned so that the line of sight has bearing 0, the target's yaw is its relative
     # heading.
-    *turned, elevation = turned_to_sight(cells)
+    *turned, elevation = aspect_angles_of_cells(cells)
     return aspect_angles(np.zeros(len(cells)), elevation, *turned)
 
 

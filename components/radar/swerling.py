@@ -348,7 +348,11 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def cued_crossing(self) -> Crossing | None:
         """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
-        return None if self._cued_detector is None else Crossing.of(*self._cued_detector)
+        return (
+            None
+            if self._cued_detector is None
+            else Crossing.from_false_alarms(*self._cued_detector)
+        )
 
     def _reference(self, model: int) -> float:
         if model not in self._reference_db:

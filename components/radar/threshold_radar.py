@@ -181,14 +181,14 @@ class LinkBudgetRadar(Radar):
         snr, beside = self.snr(cells), [self.echo_snr(cells, echo(cells)) for echo in self.echoes]
         if self._beam_shape is not None:
             snr = snr * self._beam_shape(cells)
-        snr, beside = self.filtered(cells, snr, beside)
-        clutter = Clutter.summed(self.echoes, beside, len(cells)) if self.echoes else None
-        return self.resolved(cells, snr), clutter
+        snr, beside = self.filter_echoes(cells, snr, beside)
+        clutter = Clutter.sum_echoes(self.echoes, beside, len(cells)) if self.echoes else None
+        return self.resolve_echoes(cells, snr), clutter
 
     @property
     def crossing(self) -> Crossing:
         """How a look crosses the threshold: a target's output and noise alike."""
-        return Crossing.of(self.p.pulses_summed, self.p.false_alarm_probability)
+        return Crossing.from_false_alarms(self.p.pulses_summed, self.p.false_alarm_probability)
 
     def cued_crossing(self) -> Crossing | None:
         """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
@@ -344,13 +344,13 @@ class ThresholdRadar(LinkBudgetRadar):
     @property
     def crossing(self) -> Crossing:
         """How a look crosses the threshold: noise crosses the one that targets do."""
-        return Crossing.at(self.p.pulses_summed, self.threshold_db)
+        return Crossing.from_snr(self.p.pulses_summed, self.threshold_db)
 
     def cued_crossing(self) -> Crossing | None:
         """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
         if self.cued_threshold_db == self.threshold_db:
             return None
-        return Crossing.at(self.p.pulses_summed, self.cued_threshold_db)
+        return Crossing.from_snr(self.p.pulses_summed, self.cued_threshold_db)
 
     def noise_key(self) -> str:
         """Say which key sets how often noise crosses the threshold, and its value."""

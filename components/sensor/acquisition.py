@@ -36,7 +36,7 @@ class AcquisitionRange(Parameters):
     )
 
     @model_validator(mode="after")
-    def _a_share_each(self) -> Self:
+    def _check_shares(self) -> Self:
         azimuths = self.azimuth_deg
         if len(azimuths) != len(self.share):
             raise ValueError(
@@ -73,7 +73,7 @@ class Acquired:
         """Return 1 for each cell whose target is seen, else 0."""
         if not self._ranges or len(cells) == 0:
             return np.ones(len(cells))
-        within, near = self._of(cells)
+        within, near = self._cells_in_range(cells)
         width = len(cells.roster.names)
         targets = cells.run * width + cells.target
         missing = (int(cells.run.max()) + 1) * width - len(self._last_scan)
@@ -95,7 +95,7 @@ class Acquired:
         factor[order] = seen
         return factor
 
-    def _of(self, cells: Cells) -> tuple[BoolArray, BoolArray]:
+    def _cells_in_range(self, cells: Cells) -> tuple[BoolArray, BoolArray]:
         """Return which cells lie within the range of their target's speed, and which to acquire."""
         azimuth_deg = np.degrees(np.abs(cells.body_azimuth_rad))
         speed = np.zeros(len(cells)) if len(self._ranges) == 1 else ground_speed_m_s(cells)

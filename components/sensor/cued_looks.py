@@ -12,7 +12,7 @@ from components.messages.columns import ORIGIN, POSE, STATE
 from components.messages.cues import CueCones
 from components.messages.detections import Detections
 from components.messages.targets import RelativeTargets
-from dsa_des.arrays.column_values import picked
+from dsa_des.arrays.column_values import take_rows
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.wake import Wake
@@ -28,7 +28,8 @@ def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
     if believed is None:
         return {}
     return {
-        field: picked(believed[name], rows) for name, field in zip(POSE_FIELDS, POSE, strict=True)
+        field: take_rows(believed[name], rows)
+        for name, field in zip(POSE_FIELDS, POSE, strict=True)
     }
 
 
@@ -143,7 +144,7 @@ class CuedLooks(Effect[ConesAhead]):
 
     def verdict(self, block: Any) -> Verdict:
         """Ask for a wire that brings cues."""
-        sources = _cued_by(block)
+        sources = _cueing_blocks(block)
         if not sources:
             return Verdict(False, "no wire brings cues")
         return Verdict(True, f"{' and '.join(sources)} cues it")
@@ -153,7 +154,7 @@ class CuedLooks(Effect[ConesAhead]):
         return ConesAhead()
 
 
-def _cued_by(block: Any) -> list[str]:
+def _cueing_blocks(block: Any) -> list[str]:
     return [one.block for one in block.context.producers if one.port == PORT]
 
 
@@ -164,7 +165,7 @@ _NO_THRESHOLD = "all inside its range is detected, there is no threshold to lowe
 
 def refuse_cues(block: Any, because: str = _NO_THRESHOLD) -> None:
     """Raise ValueError if a sensor that cannot look harder is cued."""
-    if sources := _cued_by(block):
+    if sources := _cueing_blocks(block):
         raise ValueError(
             f"{sources[0]} cues it, and it takes no cues: {because}; cue a sensor that has one, or "
             "leave the wire out"
@@ -178,7 +179,7 @@ def cue_warnings(block: Any) -> list[str]:
         for name in type(block.p).model_fields
         if name.startswith("cued_") and getattr(block.p, name) not in (None, False)
     ]
-    cued = bool(_cued_by(block))
+    cued = bool(_cueing_blocks(block))
     if cued and not given:
         return [
             "is cued, and nothing says what it then does otherwise: give one of its cued_* keys"

@@ -159,7 +159,7 @@ class SeenPlaces:
         """Return some of them."""
         return SeenPlaces(*(values[which] for values in vars(self).values()))
 
-    def then(self, later: SeenPlaces) -> SeenPlaces:
+    def append(self, later: SeenPlaces) -> SeenPlaces:
         """Return these and later ones."""
         both = zip(vars(self).values(), vars(later).values(), strict=True)
         return SeenPlaces(*(np.concatenate(pair) for pair in both))
@@ -183,17 +183,17 @@ def scans_with_company(
         scans, wanted = RunTicks(places.run, places.scan), places.scan[asked] - lag
         first = next_of_run(scans, RunTicks(places.run[asked], wanted))
         number = next_of_run(scans, RunTicks(places.run[asked], wanted + 1)) - first
-        pairs = _every_pair(first, number)
+        pairs = _enumerate_pairs(first, number)
         if int(number.sum()) > _FEW_PAIRS:
             neighbours = neighbours or _Neighbours(places, rate_rad_s)
             pairs = neighbours.pairs(asked, first, number)
         for here, there in pairs:
-            near = _near(places, asked[here], there, speed_m_s, rate_rad_s)
+            near = _is_same_place(places, asked[here], there, speed_m_s, rate_rad_s)
             count += np.bincount(here[near], minlength=len(asked)) > 0
     return count
 
 
-def _every_pair(first: IntArray, number: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
+def _enumerate_pairs(first: IntArray, number: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
     """Give each asked one's index with those of a scan: so many entries from its first on."""
     start, most = 0, max(1, _MOST_PAIRS // max(1, int(number.max(initial=1))))
     while start < len(first):
@@ -240,7 +240,7 @@ class _Neighbours:
             yield np.repeat(some[rows], counts[rows]), there
 
 
-def _near(
+def _is_same_place(
     places: SeenPlaces, one: IntArray, other: IntArray, speed_m_s: float, rate_rad_s: float
 ) -> BoolArray:
     """Say which pairs of entries have one position."""
@@ -280,7 +280,7 @@ class DeclaredPlaces:
         new = self._places(detections)
         known, asked = new, np.arange(len(new))
         if self._memory is not None:
-            known = self._memory.then(new)
+            known = self._memory.append(new)
             asked = asked + len(self._memory)
             order = RunTicks(known.run, known.scan).order()
             if order is not None:  # runs come back one after the other

@@ -32,7 +32,7 @@ class Wander:
         self._lasts_s = block.p.glint_correlation_time_s
         self._process = GaussMarkov(block.stream("glint"), self._lasts_s)
         rosters = [one for one in known_targets(block.context) if len(one.extents_m)]
-        rosters = rosters or [Roster.of([("", Aircraft())])]
+        rosters = rosters or [Roster.from_pairs([("", Aircraft())])]
         length2, span2, height2 = np.mean(
             np.concatenate([roster.extents_m for roster in rosters]) ** 2, axis=0
         ).tolist()

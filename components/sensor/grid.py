@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry import TWO_PI, past, rising_sector, wrap_pi
-from dsa_des.arrays.column_values import constant, nothing_in
+from components.geometry import TWO_PI, remainder, rising_sector, wrap_pi
+from dsa_des.arrays.column_values import constant, null_column
 from dsa_des.arrays.types import FloatArray
 
 # A limit that misses a grid point by no more than this share of itself counts as lying on it: 110
@@ -110,7 +110,7 @@ class Grid:
         return results
 
 
-def _whole_steps(size: Any, steps: Any) -> tuple[Any, Any, Any]:
+def _split_steps(size: Any, steps: Any) -> tuple[Any, Any, Any]:
     """Split size >= 0 exactly into whole steps and a remainder; say where that makes sense."""
     counts = (steps > 0.0) & (size * _COUNTABLE < steps) & (size < _LARGEST)
     spacing = np.where(counts, steps, 1.0)
@@ -121,8 +121,8 @@ def _whole_steps(size: Any, steps: Any) -> tuple[Any, Any, Any]:
 
 def _nearest(size: Any, steps: Any) -> Any:
     """Round size >= 0 to the grid."""
-    counts, whole, rest = _whole_steps(size, steps)
-    return np.where(counts, (whole + _goes_up(whole, rest, steps)) * steps, size)
+    counts, whole, rest = _split_steps(size, steps)
+    return np.where(counts, (whole + _rounds_up(whole, rest, steps)) * steps, size)
 
 
 def _nearest_countable(size: FloatArray, step: float) -> FloatArray:
@@ -136,12 +136,12 @@ def _nearest_countable(size: FloatArray, step: float) -> FloatArray:
     if np.count_nonzero(unsure):
         rest = np.fmod(size[unsure], step)
         exact = np.rint((size[unsure] - rest) / step)
-        whole[unsure] = exact + _goes_up(exact, rest, step)
+        whole[unsure] = exact + _rounds_up(exact, rest, step)
     whole *= step
     return whole
 
 
-def _goes_up(whole: Any, rest: Any, steps: Any) -> Any:
+def _rounds_up(whole: Any, rest: Any, steps: Any) -> Any:
     """Say where the next grid point is nearer; half-way it is the even one."""
     # rest and steps - rest are compared without rounding: below half a step rest is subtracted
     # from the larger, above it the subtraction is exact (Sterbenz).
@@ -156,7 +156,7 @@ def _goes_up(whole: Any, rest: Any, steps: Any) -> Any:
 def _outermost(limit: Any, steps: Any) -> Any:
     """Find the largest grid point that is not above the limit (nor outside by a last place)."""
     size = np.abs(limit)
-    counts, whole, rest = _whole_steps(size, steps)
+    counts, whole, rest = _split_steps(size, steps)
     above = limit >= 0.0
     # Going down from a negative limit is going up in size.
     near_next = (steps - rest) <= size * _LIMIT_TOLERANCE
@@ -231,7 +231,7 @@ class SensorGrid:
         azimuth = self._round_azimuth(azimuth_rad)
         elevation = self._elevation_grid.round(elevation_rad)
         if self._range_step is None:
-            return azimuth, elevation, nothing_in(len(range_m))
+            return azimuth, elevation, null_column(len(range_m))
         return azimuth, elevation, self._range_grid.round(range_m)
 
     @cached_property
@@ -263,5 +263,5 @@ class SensorGrid:
         if low >= -math.pi and high <= math.pi:
             return self._azimuth_grid.round(azimuth_rad)
         # The field runs across ±pi: unwrap into it, so that its edges are its limits.
-        unwrapped = np.clip(low + past(azimuth_rad - low, TWO_PI), low, high)
+        unwrapped = np.clip(low + remainder(azimuth_rad - low, TWO_PI), low, high)
         return wrap_pi(self._azimuth_grid.round(unwrapped))

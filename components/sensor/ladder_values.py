@@ -21,7 +21,7 @@ def angle_apart_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
     return 1e3 * angle_between_vectors(one, other)
 
 
-def wrapped_apart_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
+def angular_distance_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
     """Return how far angles in radians are apart, the short way round, mrad; NaN stays NaN."""
     apart = one - other
     known = ~np.isnan(apart)
@@ -30,7 +30,7 @@ def wrapped_apart_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
     return result
 
 
-def over_roster(targets: RelativeTargets, values: FloatArray) -> FloatArray:
+def spread_over_roster(targets: RelativeTargets, values: FloatArray) -> FloatArray:
     """Return (rows, targets, ...) values over all targets of the run, NaN where absent."""
     shape = (len(values), len(targets.roster), *values.shape[2:])
     wide: FloatArray = np.full(shape, np.nan)
@@ -41,7 +41,7 @@ def over_roster(targets: RelativeTargets, values: FloatArray) -> FloatArray:
     return wide
 
 
-def over_cells(
+def evaluate_over_cells(
     sensor: Sensor,
     wake: Wake,
     values: Callable[[Cells], dict[str, FloatArray]],
@@ -56,7 +56,7 @@ def over_cells(
     held = wake.held("targets")
     if held is None:
         return {}
-    targets, rows = sensor.seen(*held)
+    targets, rows = sensor.see_targets(*held)
     cells, reason = sensor.cells(targets, rows, wake)
     on_roster = len(targets.roster)
     wide_by_name: dict[str, Any] = {}
@@ -78,7 +78,7 @@ def measure_cells(
 
     def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
         sensor: Any = block
-        given = over_cells(
+        given = evaluate_over_cells(
             sensor, wake, lambda cells: values(sensor, cells), out_of_range=out_of_range
         )
         return dict(given)

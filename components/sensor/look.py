@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.messages.targets import RelativeTargets
-from dsa_des.arrays.column_values import of_one_value, picked
+from dsa_des.arrays.column_values import is_constant, take_rows
 from dsa_des.arrays.entries import cells_of
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
@@ -132,11 +132,11 @@ class Cells:
         if name[0] == "_":
             raise AttributeError(name)
         values = getattr(self._targets, name)
-        if self._width > 1 and of_one_value(values):  # of each target
+        if self._width > 1 and is_constant(values):  # of each target
             gathered = values[0].take(self._column)
         else:
             flat = values.reshape(-1)
-            gathered = flat if self._everything else picked(flat, self._flat)
+            gathered = flat if self._everything else take_rows(flat, self._flat)
         self.__dict__[name] = gathered  # the next time it is a plain attribute
         return gathered
 
@@ -213,7 +213,7 @@ class Cells:
     def craft(self) -> IntArray:
         """Which of the roster's aircraft each cell's target is."""
         roster = self.roster
-        return self.target if roster.shared else roster.craft(self.target, self.run)
+        return self.target if roster.is_shared else roster.craft(self.target, self.run)
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
         """Return uniform draws keyed by each cell's target and scan."""
@@ -221,7 +221,7 @@ class Cells:
         return stream.of_runs(self.run, self.instant_ns).uniform(keys, self.scan, draw)
 
 
-def turned_to_sight(
+def aspect_angles_of_cells(
     cells: Any, chosen: Any = slice(None)
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return heading against the line of sight, pitch, roll, and the line's elevation, of cells."""

@@ -19,7 +19,7 @@ from components.sensor.grid import (
 )
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import StatedError
-from dsa_des.arrays.column_values import constant, nothing_in
+from dsa_des.arrays.column_values import constant, null_column
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.time.gauss_markov import GaussMarkov
@@ -203,7 +203,7 @@ class ErrorModel:
         on_grid = {name: grid.round(values[name]) for name, grid in self._grids.items()}
         on_grid["azimuth"] = wrap_pi_unchecked(on_grid["azimuth"])
         if "range" not in on_grid:
-            on_grid["range"] = nothing_in(len(azimuth))
+            on_grid["range"] = null_column(len(azimuth))
         else:
             nearest = self._steps["range"] or _NEAREST_M
             on_grid["range"] = np.maximum(np.abs(on_grid["range"]), nearest)

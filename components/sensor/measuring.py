@@ -75,7 +75,7 @@ class Measuring(Component):
         """The grid of reports in the sensor's axes."""
         return SensorGrid(self.reach.azimuth_rad, self.reach.elevation_rad, self.steps)
 
-    def _measured(
+    def _measure(
         self,
         cells: Cells,
         detected: IntArray,
@@ -92,7 +92,7 @@ class Measuring(Component):
         true = {"azimuth": azimuth, "elevation": elevation, "range": self.seeming_range_m(range_m)}
         if (rate := self.range_rate(cells, detected)) is not None:
             true["range_rate"] = rate
-        return self._in_body(*self._measurement(cells, detected, look, true))
+        return self._to_body_axes(*self._measurement(cells, detected, look, true))
 
     def report_noise(
         self,
@@ -107,9 +107,9 @@ class Measuring(Component):
         without them a position by the edge of the field of view would never be reported beyond it.
         The last value holds the other measured columns of `Detections`.
         """
-        return self._in_body(*self._measurement.of_noise(where, signal, drawn))
+        return self._to_body_axes(*self._measurement.of_noise(where, signal, drawn))
 
-    def _in_body(
+    def _to_body_axes(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
         """Return angles in body axes, ranges, and columns beside, of values in the sensor's."""

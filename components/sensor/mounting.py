@@ -7,8 +7,8 @@ from typing import Any
 from components.geometry import (
     body_angles,
     body_to_ned,
+    rotate_variances,
     sensor_angles,
-    turned_variances,
     unit_vector,
 )
 from components.messages.reach import Reach, ReasonArray
@@ -65,7 +65,7 @@ class SensorAxes:
         """Return variances of reports in body axes from those in the sensor's axes."""
         if self.believed_rad is None:
             return azimuth_variance_rad2, elevation_variance_rad2
-        return turned_variances(
+        return rotate_variances(
             azimuth_rad,
             elevation_rad,
             azimuth_variance_rad2,

@@ -53,7 +53,7 @@ from dsa_des.block.wake import Wake
 _FEW_COLUMNS = 8
 
 
-def counted(
+def count_reasons(
     reason: ReasonArray, on_roster: int, culled: IntArray | None, hides: bool
 ) -> tuple[IntArray, dict[str, IntArray]]:
     """Return how many targets were evaluated at each scan, and skipped by reason.
@@ -69,7 +69,7 @@ def counted(
         of = {code: count[code] for code in (EVALUATE, *SKIP_REASONS.values())}
     else:
         of = {
-            code: _per_row(reason == code)
+            code: _count_per_row(reason == code)
             for code in (EVALUATE, *SKIP_REASONS.values())
             if hides or code != HIDDEN
         }
@@ -84,7 +84,7 @@ def counted(
     return of[EVALUATE], skipped
 
 
-def _per_row(mask: BoolArray) -> IntArray:
+def _count_per_row(mask: BoolArray) -> IntArray:
     """Return how many are true in each row of few columns: ten times as fast as their sum."""
     if not np.count_nonzero(mask):
         return _of_each(0, len(mask))
@@ -209,14 +209,14 @@ class Sensor(Measuring):
         return message
 
     @cached_property
-    def _says_looks(self) -> bool:
+    def _is_asked_for_looks(self) -> bool:
         """Whether the scene asks for every look."""
         record = self.context.sections.get("record")
         return bool(record is not None and record.looks)
 
     def records(self) -> list[type[Message]]:
         """Return what is recorded: every look too, where the scene asks for it."""
-        return [self._message, EveryLook] if self._says_looks else [self._message]
+        return [self._message, EveryLook] if self._is_asked_for_looks else [self._message]
 
     @cached_property
     def _judgements(self) -> list[Judging]:
@@ -234,7 +234,7 @@ class Sensor(Measuring):
     def _reporting(self) -> list[Reporting]:
         return self.built(REPORT)
 
-    def seen(
+    def see_targets(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
     ) -> tuple[RelativeTargets, IntArray]:
         """Return the targets as this sensor sees them, and the row of each scan.
@@ -258,13 +258,13 @@ class Sensor(Measuring):
         if held is None:
             return None
         cued = None if self._cueing is None else self._cueing(*held, wake)
-        targets, rows = self.seen(*held, cued)
+        targets, rows = self.see_targets(*held, cued)
         cells, reason = self.cells(targets, rows, wake)
         if cued is not None:
             cells.cued = cued[reason == EVALUATE]
         rows = cells.message_rows
         # Where rows are of several runs, what is remembered of each may change without cells.
-        run = int(wake.run[0]) if wake.instants.one_run else -1
+        run = int(wake.run[0]) if wake.instants.is_one_run else -1
         look = self._idle if run == self._idle_run else None
         if look is None or len(cells):
             look = self.look(cells)
@@ -279,7 +279,7 @@ class Sensor(Measuring):
         for measures in self._strengths:
             look = measures(cells, detected, look)
         culled = None if targets.culled is None else targets.culled[rows]
-        evaluated, skipped = counted(
+        evaluated, skipped = count_reasons(
             reason, len(targets.roster), culled, targets.hidden is not None
         )
         row = cells.row[detected]
@@ -292,7 +292,7 @@ class Sensor(Measuring):
                    cells.range_m[detected])  # fmt: skip
         azimuth, elevation, range_m = p, q, r
         if len(detected):
-            azimuth, elevation, range_m, measured = self._measured(cells, detected, look, p, q, r)
+            azimuth, elevation, range_m, measured = self._measure(cells, detected, look, p, q, r)
         detections = self._message(
             tick=wake.ticks,
             run=wake.run,
@@ -312,7 +312,7 @@ class Sensor(Measuring):
             extras={name: values[detected] for name, values in self._extras(cells, look).items()},
             roster=targets.roster,
             **believed_pose(targets, rows),
-            looks=looks_of(cells, decided, len(wake)) if self._says_looks else None,
+            looks=looks_of(cells, decided, len(wake)) if self._is_asked_for_looks else None,
         )
         detections.row_of_entries = row
         for report in self._reporting:
@@ -358,7 +358,7 @@ class Sensor(Measuring):
     def _decide(self, targets: RelativeTargets, rows: IntArray) -> ReasonArray:
         """Return the reasons of each scan, from the gate's decision if it has one."""
         if isinstance(targets, GatedTargets) and self.name in targets.decisions:
-            reason = targets.decisions[self.name].at(rows)
+            reason = targets.decisions[self.name].reasons_at(rows)
             if reason is not None:
                 return reason
         part = targets.take(rows)

@@ -40,7 +40,7 @@ class Follower:
         self._tracks: dict[str, Followed] = {}
         self._next = 1
 
-    def after(
+    def follow_look(
         self, tracks: Any, time_s: float, when: datetime, mask_of: Mapping[str, int]
     ) -> list[Followed]:
         """Return all tracks after a look, by number; those that are gone a last time."""

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 
-def needs_stone_soup(what: str) -> None:
+def require_stone_soup(what: str) -> None:
     """Say how to install the extra if it is missing."""
     try:
         import_module("stonesoup")

@@ -8,18 +8,18 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from components.estimation.frame import SensorPose, pose_in_frame
-from components.estimation.measurement import Kind, linearised
+from components.estimation.measurement import Kind, linearise
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import COVARIANCE, DELETED, StateTracks
 from components.sensor.marks import TRACKER
 from components.stone_soup.follower import Followed, Follower
-from components.stone_soup.library import Repeatable, needs_stone_soup
+from components.stone_soup.library import Repeatable, require_stone_soup
 from components.tracking.out_of_sequence import LookCount, latest_s
 from components.tracking.promises import ACTS_EVERY_S, Promises
 from components.tracking.reported_errors import folded_ranges, unknown_latency
-from components.tracking.scans import Scans, scans_of, when_made
+from components.tracking.scans import Scans, scans_of, split_due_looks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
@@ -88,7 +88,7 @@ class StoneSoupTracker(Component):
 
     def setup(self) -> None:
         """Build the tracker."""
-        needs_stone_soup("tracking.stonesoup")
+        require_stone_soup("tracking.stonesoup")
         self._ahead: Scans | None = None
         self._origin: FloatArray | None = None
         self._own_m = np.zeros(3)
@@ -107,7 +107,7 @@ class StoneSoupTracker(Component):
         self._repeatable = Repeatable(
             key_of(getattr(self.context.streams, "seed", 0), self.name, "stone soup")
         )
-        self._tracker = self._built()
+        self._tracker = self._build_tracker()
 
     def warnings(self) -> list[str]:
         """Say whose errors last from look to look, which Stone Soup takes for new ones."""
@@ -125,7 +125,7 @@ class StoneSoupTracker(Component):
                              "too sure where errors are the same again")  # fmt: skip
         return super().warnings() + said
 
-    def _built(self) -> Any:
+    def _build_tracker(self) -> Any:
         name = self.p.builder
         try:
             build = load_named(name, f"blocks.{self.name}.builder")
@@ -161,12 +161,12 @@ class StoneSoupTracker(Component):
             in_time = False
             for look, pose in due.get(row, ()):
                 if look.tick[0] < self._newest:
-                    self._count = self._count.of(self._sensors, look, slice(0), [0])
+                    self._count = self._count.with_looks(self._sensors, look, slice(0), [0])
                     continue
                 in_time = True
-                here |= {one.number: one for one in self._looked(look, pose, wake)}
+                here |= {one.number: one for one in self._process_look(look, pose, wake)}
             if not in_time and self._is_silent(tick):
-                ended = self._handed_over(tick - self._wait_ticks, wake, set())
+                ended = self._process_instant(tick - self._wait_ticks, wake, set())
                 if any(one.status == DELETED for one in ended):
                     here, in_time = {one.number: one for one in ended}, True
             if in_time:
@@ -182,12 +182,12 @@ class StoneSoupTracker(Component):
             self._sensors = fused.sensors
             came = scans_of(fused)
             came = replace(came, row=np.flatnonzero(~wake.idle)[came.row])
-            self._count = self._count.of(fused.sensors, came, slice(None), [])
+            self._count = self._count.with_looks(fused.sensors, came, slice(None), [])
         elif self._ahead is not None:
             came = self._ahead.take(np.zeros(0, dtype=np.int64))
         else:
             return {}
-        scans, self._ahead = when_made(came, self._ahead, wake, self._wait_ticks)
+        scans, self._ahead = split_due_looks(came, self._ahead, wake, self._wait_ticks)
         due: dict[int, list[tuple[Scans, SensorPose]]] = {}
         if len(scans):
             if self._origin is None:
@@ -204,7 +204,7 @@ class StoneSoupTracker(Component):
         quiet = tick - self._wait_ticks - self._looked_tick
         return bool(self._follower) and self._ahead is None and quiet >= self._quiet_ticks
 
-    def _looked(self, look: Scans, pose: SensorPose, wake: Wake) -> "list[Followed]":
+    def _process_look(self, look: Scans, pose: SensorPose, wake: Wake) -> "list[Followed]":
         """Hand one look over, and return the tracks after it."""
         from components.stone_soup.objects import Poses, detections, instant
 
@@ -218,9 +218,9 @@ class StoneSoupTracker(Component):
         )  # fmt: skip
         self._masks.update(zip(names, masks, strict=True))
         self._looked_tick, self._own_m = tick, pose.position_m[:, 0]
-        return self._handed_over(tick, wake, result)
+        return self._process_instant(tick, wake, result)
 
-    def _handed_over(self, tick: int, wake: Wake, found: "set[Any]") -> "list[Followed]":
+    def _process_instant(self, tick: int, wake: Wake, found: "set[Any]") -> "list[Followed]":
         """Hand over what was detected at an instant, and return the tracks after it."""
         from components.stone_soup.objects import instant
 
@@ -228,7 +228,7 @@ class StoneSoupTracker(Component):
         when, self._newest = instant(time_s), tick
         with self._repeatable.working():
             _, tracks = self._tracker.update_tracker(when, found)
-            return self._follower.after(tracks, time_s, when, self._masks)
+            return self._follower.follow_look(tracks, time_s, when, self._masks)
 
     def _message(
         self, wake: Wake, rows: list[int], entries: "list[tuple[int, FloatArray, Followed]]"
@@ -245,7 +245,7 @@ class StoneSoupTracker(Component):
             own_m,
             np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2),
         )
-        seen, by_state = linearised(Kind(False), state, at)
+        seen, by_state = linearise(Kind(False), state, at)
         angular = np.einsum("ikn,kln,iln->in", by_state, spread[:3, :3], by_state)
         ranged = np.array([one.ranged for one in tracks], dtype=bool)
 

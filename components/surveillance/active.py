@@ -23,7 +23,7 @@ from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import rising_elevations
 from components.surveillance.altimetry import altimetry_variance_ft2
-from components.surveillance.believed_line import OwnBelief, in_body, variances_in_body
+from components.surveillance.believed_line import OwnBelief, ned_to_body_angles, variances_in_body
 from components.surveillance.broadcast import Altimeters, Transponders
 from components.surveillance.cooperative import (
     CooperativeParameters,
@@ -47,10 +47,10 @@ from components.surveillance.interrogation import (
     reach_m,
     sine_of_elevation,
 )
-from components.surveillance.reports import unreported
+from components.surveillance.reports import empty_report_columns
 from components.surveillance.stated_errors import (
     ERRORS_OF_REPLIES,
-    unstated_errors,
+    empty_error_columns,
     variances_of_replies,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
@@ -104,7 +104,7 @@ class ActiveParameters(CooperativeParameters):
     )
 
     @model_validator(mode="after")
-    def _looks_somewhere(self) -> Self:
+    def _check_sectors(self) -> Self:
         if self.range_km is not None and self.range_km * 1000.0 > _FARTHEST_M:
             raise ValueError(
                 f"range_km is {self.range_km:g}: no transponder answers beyond "
@@ -231,9 +231,9 @@ class Active(CooperativeSensor):
             detected[asked] = self._answer(cells, asked, probability[asked], instant_ns)
         answered = np.flatnonzero(detected)
         now = self.reported_altitude_m(cells, answered, cells.alt_m[answered])
-        detected[answered] = placed = self.placed(cells, answered, now)
+        detected[answered] = placed = self.has_position(cells, answered, now)
         answered, now = answered[placed], now[placed]
-        extras = unreported(len(cells))
+        extras = empty_report_columns(len(cells))
         equipage, craft = cells.roster.equipage, cells.craft[answered]
         extras["address"][answered] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)
         extras["reported_alt_m"][answered] = now
@@ -262,13 +262,13 @@ class Active(CooperativeSensor):
             for ago_s in (since_s, since_s + every * period_s):
                 then = cells.seen_at(rest, -ago_s)
                 instant_ns = cells.state_ns[rest] - np.rint(ago_s * NANOSECONDS).astype(np.int64)
-                known &= self._answered(cells, rest, then, instant_ns)
-                ranges.append(self._ranged(cells, rest, then["range_m"], instant_ns))
+                known &= self._draw_answers(cells, rest, then, instant_ns)
+                ranges.append(self._range_errors(cells, rest, then["range_m"], instant_ns))
             rate = (ranges[0] - ranges[1]) / (every * period_s)
             due[~due] = ~known | is_near(ranges[0] + rate * since_s, rate, self.p.near_s)
         return np.asarray(due)
 
-    def _answered(
+    def _draw_answers(
         self, cells: Cells, which: AnyArray, then: Any, instant_ns: IntArray
     ) -> BoolArray:
         """Return which answered at a turn of theirs, as everything was `then`."""
@@ -303,7 +303,7 @@ class Active(CooperativeSensor):
     ) -> FloatArray:
         """Return what some cells' transponders report of true altitudes, m."""
         step_ft = self._mode_step_ft(cells, which) if self._errs else 0.0
-        transponders = Transponders.of(cells, which)
+        transponders = Transponders.from_cells(cells, which)
         altitude_m = self.altimeter_m(altitude_m)
         return self._altimeters.reported_ft(transponders, altitude_m, step_ft, self._errs) * FOOT_M
 
@@ -316,9 +316,9 @@ class Active(CooperativeSensor):
 
     def measured_range_m(self, cells: Cells, which: AnyArray) -> FloatArray:
         """Return the ranges that the answers of some cells come from, m."""
-        return self._ranged(cells, which, cells.range_m[which], cells.state_ns[which])
+        return self._range_errors(cells, which, cells.range_m[which], cells.state_ns[which])
 
-    def _ranged(
+    def _range_errors(
         self, cells: Cells, which: AnyArray, range_m: FloatArray, instant_ns: IntArray
     ) -> FloatArray:
         if not self._errs:
@@ -328,7 +328,7 @@ class Active(CooperativeSensor):
         bias = np.where(cells.roster.equipage.mode_s[cells.craft[which]], *RANGE_BIAS_M)
         return np.maximum(range_m + bias + RANGE_ERROR_M * drawn, 1.0)
 
-    def _measured(
+    def _measure(
         self,
         cells: Cells,
         detected: AnyArray,
@@ -338,7 +338,7 @@ class Active(CooperativeSensor):
         range_m: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, Any]]:
         """Return measured lines of sight in body axes, and their variances."""
-        own = OwnBelief.of(cells, detected)
+        own = OwnBelief.from_cells(cells, detected)
         distance = self.measured_range_m(cells, detected)
         deviation = bearing_deviation_rad(elevation_rad) * float(self._errs)
         keys, bearings = cells.roster.keys_of(cells.target[detected]), self._bearings
@@ -352,7 +352,7 @@ class Active(CooperativeSensor):
         rise = sine_of_elevation(height - own.alt_m, distance)
         ground = np.sqrt(np.maximum(1.0 - rise**2, 0.0))
         ned = distance * np.stack([ground * np.cos(bearing), ground * np.sin(bearing), -rise])
-        azimuth, elevation, _ = in_body(own, ned)
+        azimuth, elevation, _ = ned_to_body_angles(own, ned)
         variances = (np.full(len(detected), _LEAST_M2),) * 3
         if self._errs:
             position_m, attitude_rad = navigation_noise(self.context)
@@ -365,10 +365,10 @@ class Active(CooperativeSensor):
         vertical = vertical + self.p.pressure_deviation_m**2
         beside: dict[str, Any] = variances_in_body(own, ned, (across, along, vertical))
         if self._errs:
-            beside["told_by_target"] = self._told(cells, detected, altitude, deviation)
+            beside["told_by_target"] = self._error_deviations(cells, detected, altitude, deviation)
         return wrap_pi_unchecked(azimuth), elevation, distance, beside
 
-    def _told(
+    def _error_deviations(
         self, cells: Cells, detected: AnyArray, altitude_m: FloatArray, deviation: FloatArray
     ) -> dict[str, FloatArray]:
         """Return the deviations of all errors, as `TOLD`."""
@@ -378,7 +378,7 @@ class Active(CooperativeSensor):
         own = own_velocity(cells, detected)
         altimetry_ft2 = altimetry_variance_ft2(altitude_m / FOOT_M)
         step_ft = self._step_ft(cells, detected, altitude_m)
-        return unstated_errors(len(detected)) | {
+        return empty_error_columns(len(detected)) | {
             "own_north": own[0], "own_east": own[1], "own_down": own[2],
             "height_deviation": np.hypot(
                 np.sqrt(altimetry_ft2) * FOOT_M, self.p.pressure_deviation_m

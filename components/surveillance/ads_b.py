@@ -20,15 +20,15 @@ from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
 from components.surveillance.believed_line import (
     OwnBelief,
-    in_body,
-    towards,
+    ned_to_body_angles,
+    relative_ned,
     variances_in_body,
 )
 from components.surveillance.broadcast import (
     Broadcasts,
     Sent,
     Transponders,
-    velocity_in_axes_at,
+    rotate_velocity_to_later,
 )
 from components.surveillance.cooperative import (
     STEP_S,
@@ -41,16 +41,16 @@ from components.surveillance.reception import (
     AIRCRAFT_AROUND,
     AIRPORTS_AROUND,
     LAWS,
-    fitted,
+    fitted_reception_probability,
     promises_by_range,
 )
-from components.surveillance.reports import unreported
+from components.surveillance.reports import empty_report_columns
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
 from components.surveillance.stated_errors import (
     LATE,
     StatedByAircraft,
+    errors_of_broadcast,
     lasting_errors,
-    told_errors,
 )
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -97,7 +97,7 @@ class AdsBParameters(CooperativeParameters):
     )  # fmt: skip
 
     @model_validator(mode="after")
-    def _within_reception(self) -> Self:
+    def _check_reception(self) -> Self:
         ends_km = LAWS[self.reception][1] / 1000.0
         if self.range_km is not None and self.range_km > ends_km:
             raise ValueError(
@@ -188,7 +188,9 @@ class AdsB(CooperativeSensor):
         self.law = LAWS[parameters.reception][0]
         if parameters.reception == "fitted":
             self.law = partial(
-                fitted, aircraft=parameters.aircraft_around, airports=parameters.airports_around
+                fitted_reception_probability,
+                aircraft=parameters.aircraft_around,
+                airports=parameters.airports_around,
             )
         #: Scan of each cell of the last look, and the ownship's velocity then.
         self._rows: tuple[IntArray, FloatArray] | None = None
@@ -206,7 +208,7 @@ class AdsB(CooperativeSensor):
         """Say that all variances differ from report to report."""
         offer: SensorOffer = super().offer(port)
         errs = self.p.position_errors != "none" or self.p.compact or self.p.pressure_deviation_m
-        told = told_errors(self.p.position_errors) if errs else ()
+        told = errors_of_broadcast(self.p.position_errors) if errs else ()
         # Of targets that may be anything some may be late.
         late = [(one.equipage.late_s > 0.0).any() for one in known_targets(self.context)]
         told = (*told, LATE) if any(late or [True]) else told
@@ -233,7 +235,7 @@ class AdsB(CooperativeSensor):
 
     def look(self, cells: Cells) -> Look:
         """Receive what was sent up to each scan, and decode the last of it."""
-        extras = unreported(len(cells))
+        extras = empty_report_columns(len(cells))
         moves = np.full((3, len(cells)), np.nan)
         equipage = cells.roster.equipage
         sends = np.flatnonzero(equipage.ads_b[cells.craft])
@@ -242,7 +244,7 @@ class AdsB(CooperativeSensor):
         detected[reported] = True
         if len(reported):
             self._report(cells, reported, number, sent_ns, extras)
-            placed = self.placed(cells, reported, extras["reported_alt_m"][reported])
+            placed = self.has_position(cells, reported, extras["reported_alt_m"][reported])
             detected[reported], reported = placed, reported[placed]
             moves[:, reported] = own_velocity(cells, reported)
             detected = self.of_others(cells, detected, extras["address"])
@@ -261,7 +263,7 @@ class AdsB(CooperativeSensor):
         now_ns = cells.state_ns[asked]
         oldest_ns = now_ns - self._oldest_age_ns(kind, cells, asked)
         count = math.ceil(int((now_ns - oldest_ns).max()) / (SHORTEST_S * NANOSECONDS)) + 1
-        senders = Transponders.of(cells, asked)
+        senders = Transponders.from_cells(cells, asked)
         number, sent_ns, counts = self._clocks[kind].latest(
             senders.keys, senders.run, now_ns, count
         )
@@ -301,8 +303,10 @@ class AdsB(CooperativeSensor):
     ) -> None:
         """Fill in what was decoded of some cells."""
         equipage, craft = cells.roster.equipage, cells.craft
-        sent = self._sent(cells, reported, number, sent_ns)
-        position = self._broadcasts.position(equipage, Transponders.of(cells, reported), sent)
+        sent = self._states_when_sent(cells, reported, number, sent_ns)
+        position = self._broadcasts.position(
+            equipage, Transponders.from_cells(cells, reported), sent
+        )
         for name, values in zip(POSITION_FIELDS, position, strict=True):
             extras[f"reported_{name}"][reported] = values
         extras["reported_s"][reported] = sent_ns / NANOSECONDS
@@ -311,14 +315,16 @@ class AdsB(CooperativeSensor):
         moving, number, sent_ns = self._last_received("velocity", cells, reported)
         if not len(moving):
             return
-        sent = self._sent(cells, moving, number, sent_ns)
-        velocity = self._broadcasts.velocity(equipage, Transponders.of(cells, moving), sent)
+        sent = self._states_when_sent(cells, moving, number, sent_ns)
+        velocity = self._broadcasts.velocity(equipage, Transponders.from_cells(cells, moving), sent)
         for axis, values in zip(("north", "east", "climb"), velocity, strict=True):
             extras[f"reported_{axis}_m_s"][moving] = values
         extras["velocity_s"][moving] = sent_ns / NANOSECONDS
         extras["nacv"][moving] = equipage.nacv[craft[moving]]
 
-    def _sent(self, cells: Cells, which: IntArray, number: IntArray, sent_ns: IntArray) -> Sent:
+    def _states_when_sent(
+        self, cells: Cells, which: IntArray, number: IntArray, sent_ns: IntArray
+    ) -> Sent:
         """Return what was true when what messages say was measured.
 
         Before a flight begins its aircraft flew on towards there as it is when the message is sent.
@@ -341,7 +347,7 @@ class AdsB(CooperativeSensor):
         lat, lon, height = position
         return Sent(lat, lon, self.altimeter_m(height), velocity, number, instant_ns)
 
-    def _measured(
+    def _measure(
         self,
         cells: Cells,
         detected: IntArray,
@@ -352,7 +358,7 @@ class AdsB(CooperativeSensor):
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
         """Return lines of sight to what is reported, at the scan, and their variances."""
         said = {name: values[detected] for name, values in look.extras.items()}
-        own = OwnBelief.of(cells, detected)
+        own = OwnBelief.from_cells(cells, detected)
         velocity = np.stack([
             said["reported_north_m_s"], said["reported_east_m_s"], -said["reported_climb_m_s"]
         ])  # fmt: skip
@@ -360,13 +366,15 @@ class AdsB(CooperativeSensor):
         age_s = now_s - said["reported_s"]
         lat, lon, altitude = (said[f"reported_{name}"] for name in POSITION_FIELDS)
         position = [lat, lon, self.heights_m(cells, detected, altitude)]
-        velocity = velocity_in_axes_at(position, velocity, said["reported_s"] - said["velocity_s"])
+        velocity = rotate_velocity_to_later(
+            position, velocity, said["reported_s"] - said["velocity_s"]
+        )
         carried = np.nan_to_num(velocity)
-        ned = towards(own, *displaced_position(*position, *(carried * age_s)))
+        ned = relative_ned(own, *displaced_position(*position, *(carried * age_s)))
         # Its velocity is in its own axes, which are turned against ours.
-        ahead = towards(own, *displaced_position(*position, *(carried * (age_s + STEP_S))))
+        ahead = relative_ned(own, *displaced_position(*position, *(carried * (age_s + STEP_S))))
         moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / STEP_S)
-        azimuth, elevation, distance = in_body(own, ned)
+        azimuth, elevation, distance = ned_to_body_angles(own, ned)
         stated = StatedByAircraft(
             cells.roster.equipage, cells.craft[detected], said,
             errs=self.p.position_errors != "none", rounds=self.p.compact,
@@ -382,7 +390,9 @@ class AdsB(CooperativeSensor):
             **variances,
             "range_rate_m_s": rate,
             "range_rate_variance_m2_s2": np.where(np.isnan(rate), np.nan, stated.speed_m2_s2),
-            "told_by_target": stated.told(moving, now_s - said["velocity_s"], age_s),
+            "told_by_target": stated.velocities_and_errors(
+                moving, now_s - said["velocity_s"], age_s
+            ),
         }
         return azimuth, elevation, distance, beside
 

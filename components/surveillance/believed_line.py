@@ -27,7 +27,7 @@ class OwnBelief:
     roll_rad: FloatArray
 
     @classmethod
-    def of(cls, cells: Cells, which: IntArray) -> OwnBelief:
+    def from_cells(cls, cells: Cells, which: IntArray) -> OwnBelief:
         """Return the belief at some cells' scans."""
         return cls(*(cells.own_belief(name)[which] for name in cls.__annotations__))
 
@@ -37,7 +37,7 @@ class OwnBelief:
         return self.yaw_rad, self.pitch_rad, self.roll_rad
 
 
-def towards(
+def relative_ned(
     own: OwnBelief, lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray
 ) -> FloatArray:
     """Return north, east and down of positions from the ownship's believed one, (3, n), m."""
@@ -48,7 +48,9 @@ def towards(
     )
 
 
-def in_body(own: OwnBelief, ned: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def ned_to_body_angles(
+    own: OwnBelief, ned: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return azimuth, elevation in body axes and range of north, east and down."""
     body = ned_to_body_unchecked(ned[0], ned[1], ned[2], *own.attitude)
     azimuth, elevation = body_angles_unchecked(*body)
@@ -77,7 +79,7 @@ def variances_in_body(
         np.stack(ned_to_body_unchecked(axis[0], axis[1], axis[2], *own.attitude))
         for axis in (side, ahead, np.stack([zero, zero, one]), *(() if off_m is None else (off_m,)))
     ]
-    azimuth, elevation, _ = in_body(own, ned)
+    azimuth, elevation, _ = ned_to_body_angles(own, ned)
     level = np.maximum(np.cos(elevation), _LEAST_COS)
     flat = np.cos(elevation)
     along = np.stack([np.cos(azimuth) * flat, np.sin(azimuth) * flat, -np.sin(elevation)])

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from components.aircraft.equipage import Equipage
 from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
-from components.geometry import NEAR_A_POLE_DEG, level_parts, turned_by_meridians
+from components.geometry import NEAR_A_POLE_DEG, level_parts, rotate_to_meridian
 from components.navigation.errors import displaced_position
 from components.sensor.look import Cells
 from components.surveillance.altimetry import altimetry_error_ft, standard_laplace
@@ -43,7 +43,7 @@ class Transponders:
     craft: IntArray
 
     @classmethod
-    def of(cls, cells: Cells, which: IntArray) -> Transponders:
+    def from_cells(cls, cells: Cells, which: IntArray) -> Transponders:
         """Return those of some cells' targets."""
         keys = cells.roster.keys_of(cells.target[which])
         return cls(keys, cells.run[which], cells.craft[which])
@@ -150,14 +150,16 @@ class Broadcasts:
         moved = sent.north_east_up_m_s + np.stack([*level, self._climb_errors(*messages)])
         near = np.flatnonzero(np.abs(sent.lat_deg) > NEAR_A_POLE_DEG)
         if len(near):
-            moved[:, near] = self._in_own_axes(equipage, transponders, sent, near, moved[:, near])
+            moved[:, near] = self._velocity_in_believed_axes(
+                equipage, transponders, sent, near, moved[:, near]
+            )
         if not self._quantised:
             return np.asarray(moved)
         north, east = quantised_velocity_kt(moved[0] / KNOT_M_S, moved[1] / KNOT_M_S)
         climb = quantised_climb_ft_min(moved[2] / FOOT_PER_MINUTE_M_S) * FOOT_PER_MINUTE_M_S
         return np.stack([north * KNOT_M_S, east * KNOT_M_S, climb])
 
-    def _in_own_axes(
+    def _velocity_in_believed_axes(
         self, equipage: Equipage, transponders: Transponders, sent: Sent, which: IntArray,
         moved: FloatArray,
     ) -> FloatArray:  # fmt: skip
@@ -172,7 +174,7 @@ class Broadcasts:
         )  # fmt: skip
         none = np.zeros_like(errors[0])
         lat, lon, _ = displaced_position(*true, sent.alt_m[which], *errors, none)
-        return turned_by_meridians(moved, true, (lat, lon))
+        return rotate_to_meridian(moved, true, (lat, lon))
 
     def position(
         self, equipage: Equipage, transponders: Transponders, sent: Sent
@@ -205,7 +207,7 @@ class Broadcasts:
         return lat, lon, feet * FOOT_M
 
 
-def velocity_in_axes_at(
+def rotate_velocity_to_later(
     position: list[FloatArray], north_east_down: FloatArray, later_s: FloatArray
 ) -> FloatArray:
     """Return velocities in the axes of positions that are later than they are, (3, n).
@@ -216,5 +218,5 @@ def velocity_in_axes_at(
     for _ in range(3):
         back = np.nan_to_num(turned * -later_s)
         lat, lon, _ = displaced_position(*position, *back)
-        turned = turned_by_meridians(north_east_down, (lat, lon), (position[0], position[1]))
+        turned = rotate_to_meridian(north_east_down, (lat, lon), (position[0], position[1]))
     return turned

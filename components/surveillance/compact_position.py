@@ -77,7 +77,7 @@ def decode_near(
     lat = _nearest(y / PARTS, np.asarray(near_lat_deg, np.float64), height)
     width = _longitude_zone_deg(lat, odd)
     lon = _nearest(x / PARTS, np.asarray(near_lon_deg, np.float64), width)
-    return lat, _wrapped(lon)
+    return lat, _wrap_longitude(lon)
 
 
 def decode_pair(
@@ -100,7 +100,7 @@ def decode_pair(
     zone = np.floor((x0 * (zones - 1) - x1 * zones) / PARTS + 0.5)
     lon = 360.0 / count * (np.mod(zone, count) + np.where(newer, x1, x0) / PARTS)
     lat = np.where(newer, lat1, lat0)
-    return np.where(fits, lat, np.nan), np.where(fits, _wrapped(lon), np.nan)
+    return np.where(fits, lat, np.nan), np.where(fits, _wrap_longitude(lon), np.nan)
 
 
 def _latitude_zone_deg(odd: BoolArray) -> FloatArray:
@@ -123,5 +123,5 @@ def _zone_of(angle_deg: FloatArray, width_deg: FloatArray) -> tuple[FloatArray, 
     return number, zones - number
 
 
-def _wrapped(lon_deg: FloatArray) -> FloatArray:
+def _wrap_longitude(lon_deg: FloatArray) -> FloatArray:
     return np.asarray(np.mod(lon_deg + 180.0, 360.0) - 180.0)

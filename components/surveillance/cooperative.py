@@ -119,7 +119,7 @@ class CooperativeSensor(Sensor):
         own_m = self.altimeter_m(cells.of_row("own_alt_m")[which])
         return altitude_m - (own_m - cells.own_belief("alt_m")[which])
 
-    def _says_heights(self) -> list[str]:
+    def _note_pressure_heights(self) -> list[str]:
         """Say by how much pressure altitudes are off where they are taken for heights."""
         if not self._air or self.p.heights != "reported":
             return []
@@ -133,10 +133,10 @@ class CooperativeSensor(Sensor):
         ]
 
     def warnings(self) -> list[str]:
-        """Say that no target has what it takes to be heard, and what heights are compared."""
+        """Note targets without the equipment to be received, and which heights are compared."""
         rosters = known_targets(self.context)
         heard = [getattr(one.equipage, name).any() for one in rosters for name in self.hears_of]
-        said = [*super().warnings(), *self._says_heights()]
+        said = [*super().warnings(), *self._note_pressure_heights()]
         if not rosters or any(heard):
             return said
         needed = " or ".join(self.hears_of)
@@ -147,7 +147,7 @@ class CooperativeSensor(Sensor):
         self._unplaced = NO_COUNTS
 
     def undone(self) -> dict[str, IntArray]:
-        """Return how many of those heard sent no altitude, by run, and with it no place."""
+        """Return how many received aircraft sent no altitude, and so have no position, by run."""
         return {**super().undone(), NO_CODE: self._unplaced}
 
     def setup(self) -> None:
@@ -163,11 +163,11 @@ class CooperativeSensor(Sensor):
         roster = cells.roster
         for name in self.p.leaves_out:
             craft = np.full(len(cells), roster.names.index(name))
-            craft = craft if roster.shared else roster.craft(craft, cells.run)
+            craft = craft if roster.is_shared else roster.craft(craft, cells.run)
             heard = heard & (address != roster.equipage.address[craft])
         return heard
 
-    def placed(self, cells: Cells, heard: IntArray, altitude_m: FloatArray) -> BoolArray:
+    def has_position(self, cells: Cells, heard: IntArray, altitude_m: FloatArray) -> BoolArray:
         """Return which of the cells that were heard are placed: one without an altitude is not.
 
         An altitude that no code has is not available (NaN).

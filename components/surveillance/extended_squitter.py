@@ -134,11 +134,11 @@ def position_messages(
     """
     y, x = encode(lat_deg, lon_deg, odd)
     address, feet, category, odd, y, x = np.broadcast_arrays(
-        _within("address", address, 0, 0xFFFFFF),
+        _check_between("address", address, 0, 0xFFFFFF),
         quantised_altitude_ft(
-            _within("altitude_ft", altitude_ft, GILLHAM_LOWEST_FT, GILLHAM_HIGHEST_FT)
+            _check_between("altitude_ft", altitude_ft, GILLHAM_LOWEST_FT, GILLHAM_HIGHEST_FT)
         ),
-        _within("nic", nic, 0, 11).astype(np.int64), np.asarray(odd, bool), y, x,
+        _check_between("nic", nic, 0, 11).astype(np.int64), np.asarray(odd, bool), y, x,
     )  # fmt: skip
     steps = ((feet - LOWEST_FT) // ALTITUDE_STEP_FT).astype(np.int64)
     fine = (feet >= LOWEST_FT) & (feet <= HIGHEST_FT)
@@ -161,12 +161,15 @@ def velocity_messages(
     Of subtype 1, or 2, the supersonic one, where a part is 1021.5 kt or more. `nacv` is the
     navigation accuracy category of velocity, 0 to 4; the vertical rate is barometric.
     """
-    level = _within("north_kt", north_kt, -1e5, 1e5), _within("east_kt", east_kt, -1e5, 1e5)
+    level = (
+        _check_between("north_kt", north_kt, -1e5, 1e5),
+        _check_between("east_kt", east_kt, -1e5, 1e5),
+    )
     address, step, north, east, climb, category = np.broadcast_arrays(
-        _within("address", address, 0, 0xFFFFFF),
+        _check_between("address", address, 0, 0xFFFFFF),
         speed_step_kt(*level), *quantised_velocity_kt(*level),
-        quantised_climb_ft_min(_within("climb_ft_min", climb_ft_min, -1e7, 1e7)),
-        _within("nacv", nacv, 0, 4),
+        quantised_climb_ft_min(_check_between("climb_ft_min", climb_ft_min, -1e7, 1e7)),
+        _check_between("nacv", nacv, 0, 4),
     )  # fmt: skip
     return _squitters(address, [
         (_VELOCITY_TYPE, 5), (np.where(step == 1, 1, 2), 3), (0, 1), (0, 1), (category, 3),
@@ -251,7 +254,7 @@ def _of_gillham(bits: IntArray) -> FloatArray:
     return np.asarray(500.0 * coarse + GILLHAM_STEP_FT * rest - 1300.0)
 
 
-def _within(name: str, values: npt.ArrayLike, low: float, high: float) -> FloatArray:
+def _check_between(name: str, values: npt.ArrayLike, low: float, high: float) -> FloatArray:
     array = np.asarray(values, np.float64)
     good = (array >= low) & (array <= high)
     if not good.all():

@@ -29,7 +29,7 @@ _PER_SECOND = 2.0
 _PROMISED_RANGES = 40
 
 
-def fitted(
+def fitted_reception_probability(
     range_m: FloatArray, aircraft: float = AIRCRAFT_AROUND, airports: float = AIRPORTS_AROUND
 ) -> FloatArray:
     """Return the probability that a receiver on the ground receives a message.
@@ -52,7 +52,7 @@ def fitted(
     return np.where(x <= 1.0, np.clip(law, 0.0, 1.0), 0.0)
 
 
-def do_365(range_m: FloatArray) -> FloatArray:
+def do_365_reception_probability(range_m: FloatArray) -> FloatArray:
     """Return the probability of one of two messages a second by RTCA DO-365, appendix Q.
 
     A report comes within 3 s with 95 % up to 10 nmi, within 7 s up to 20 nmi, and never beyond.
@@ -89,6 +89,6 @@ def certain(range_m: FloatArray) -> FloatArray:
 #: By name, with the range at which each law ends.
 LAWS: dict[str, tuple[Callable[[FloatArray], FloatArray], float]] = {
     "certain": (certain, np.inf),
-    "do_365": (do_365, DO_365_RANGES_M[1]),
-    "fitted": (fitted, FITTED_RANGE_M),
+    "do_365": (do_365_reception_probability, DO_365_RANGES_M[1]),
+    "fitted": (fitted_reception_probability, FITTED_RANGE_M),
 }

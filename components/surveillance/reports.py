@@ -38,7 +38,7 @@ class CooperativeReports(Detections):
     extras: dict[str, AnyArray] = columns({**EXTRAS, **REPORTED}, value=lambda m: m.extra_columns())
 
 
-def unreported(count: int) -> dict[str, AnyArray]:
+def empty_report_columns(count: int) -> dict[str, AnyArray]:
     """Return the columns of reports that say nothing."""
     return {
         name: np.full(count, -1) if name in _WHOLE else np.full(count, np.nan) for name in REPORTED

@@ -62,7 +62,7 @@ class SquitterClocks:
         first, start_ns = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         cells = zip(keys.tolist(), run.tolist(), until_ns.tolist(), strict=True)
         for cell, (key, of, until) in enumerate(cells):
-            starts = self._known(key, of, until)
+            starts = self._chunk_starts(key, of, until)
             # The chunk before the one that the instant lies in.
             chunk = max(bisect_right(starts, until) - 2, 0)
             first[cell], start_ns[cell] = chunk * _CHUNK, starts[chunk]
@@ -93,7 +93,7 @@ class SquitterClocks:
         steps = interval_ns(drawn).reshape(later.shape)
         return np.cumsum(np.concatenate([start_ns[:, np.newaxis], steps], axis=1), axis=1)
 
-    def _known(self, key: int, run: int, until_ns: int) -> array[int]:
+    def _chunk_starts(self, key: int, run: int, until_ns: int) -> array[int]:
         """Return the starts of an aircraft's chunks, the last one after an instant."""
         keys, runs = np.array([key], dtype=np.uint64), np.array([run])
         starts = self._starts.get((key, run))

@@ -75,7 +75,7 @@ ERRORS_OF_REPLIES = (
 )
 
 
-def told_errors(position_errors: str) -> tuple[ToldError, ...]:
+def errors_of_broadcast(position_errors: str) -> tuple[ToldError, ...]:
     """Return the errors that broadcasts tell of; what is rounded stays in its step as long."""
     lasts_s = 0.0 if position_errors == "white" else CORRELATION_TIME_S
     ways = {"place_deviation": (NORTH, EAST), "speed_deviation": (SPEED_NORTH, SPEED_EAST)}
@@ -83,7 +83,7 @@ def told_errors(position_errors: str) -> tuple[ToldError, ...]:
     return (*level, ALTIMETER, ROUNDING, VERTICAL_RATE)
 
 
-def unstated_errors(count: int) -> dict[str, FloatArray]:
+def empty_error_columns(count: int) -> dict[str, FloatArray]:
     """Return the columns `TOLD` of reports without a velocity and without errors."""
     none, unknown = np.zeros(count), np.full(count, np.nan)
     return {name: none if name.endswith(("deviation", "age_s")) else unknown for name in TOLD}
@@ -150,7 +150,7 @@ class StatedByAircraft:
         known = ~np.isnan(self.said["reported_north_m_s"])
         return np.where(known, self.equipage.late_s[self.craft], 0.0)
 
-    def carried_s(self, age_s: FloatArray) -> FloatArray:
+    def extrapolation_time_s(self, age_s: FloatArray) -> FloatArray:
         """Return for how long positions are carried on, first by the aircraft that sends them.
 
         Without a velocity of theirs nobody carries them on, and they are as old as they are.
@@ -177,11 +177,13 @@ class StatedByAircraft:
         # Without a velocity an aircraft may have gone anywhere at the speed of one.
         moving = ~np.isnan(self.said["reported_north_m_s"])
         level = (
-            level + np.where(moving, self.speed_m2_s2, _UNKNOWN_M_S**2) * self.carried_s(age_s) ** 2
+            level
+            + np.where(moving, self.speed_m2_s2, _UNKNOWN_M_S**2)
+            * self.extrapolation_time_s(age_s) ** 2
         )
         return level, level, high
 
-    def told(
+    def velocities_and_errors(
         self, north_east_down_m_s: FloatArray, velocity_age_s: FloatArray, age_s: FloatArray
     ) -> dict[str, FloatArray]:
         """Return velocities of some age, and what errs of them and of positions, as `TOLD`."""
@@ -189,7 +191,7 @@ class StatedByAircraft:
         climb += (64.0 * FOOT_PER_MINUTE_M_S) ** 2 / 12.0 if self.rounds else 0.0
         none = np.zeros(len(age_s))
         tells = (self.late_s > 0.0) | self.errs | self.rounds | (self.pressure_deviation_m > 0.0)
-        carried_s, latency_s = self.carried_s(age_s), self.equipage.latency_s[self.craft]
+        carried_s, latency_s = self.extrapolation_time_s(age_s), self.equipage.latency_s[self.craft]
         # Where errors are stated, filters know how targets move on the way.
         turned = np.where(tells, 0.0, _MANOEUVRE_M_S2 * (velocity_age_s + latency_s)) ** 2
         # Whole knots last while a flight is steady and are new while it is not: counted as both.
@@ -203,7 +205,7 @@ class StatedByAircraft:
         carried_m = np.where(known, 0.0, _UNKNOWN_M_S) * carried_s
         white = (_COMPACT_M2 if self.rounds else 0.0) + _LEAST_M2 + carried_m**2
         position = self.equipage.position_deviation_m[self.craft] if self.errs else none
-        told = unstated_errors(len(age_s)) | {
+        told = empty_error_columns(len(age_s)) | {
             "place_deviation": position,
             "height_deviation": np.sqrt(np.maximum(high - rounding_m2, 0.0)),
             "rounding_deviation": np.sqrt(rounding_m2),

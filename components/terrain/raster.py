@@ -18,12 +18,12 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
-from components.geometry import RAD_PER_DEG, past, radii_of_curvature
-from components.terrain.voids import MOST_VOIDS, filled_voids
+from components.geometry import RAD_PER_DEG, radii_of_curvature, remainder
+from components.terrain.voids import MOST_VOIDS, fill_voids
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
 from dsa_des.files.input_files import InputFileError, read_once, status_of
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 # Longitudes are met to this share of a step at the raster's edges: a degree is not exact in them.
 _EDGE = 1e-6
@@ -125,7 +125,7 @@ class ElevationRaster:
         # Whichever turn the longitude is given in; what lies a rounding west of the first column
         # is on it.
         edge = _EDGE * self.lon_step_deg
-        return v, (past(lon_deg - self.west_deg + edge, 360.0) - edge) / self.lon_step_deg
+        return v, (remainder(lon_deg - self.west_deg + edge, 360.0) - edge) / self.lon_step_deg
 
     def height(
         self, lat_deg: FloatArray, lon_deg: FloatArray
@@ -240,7 +240,7 @@ def read_raster(path: Path) -> ElevationRaster:
         If it cannot be read, is of another kind, has more holes than are filled, or needs a package
         that is missing.
     """
-    name = shortened(path.name, 80)
+    name = shorten(path.name, 80)
     if re.fullmatch(r".*\.hgt(\.zip|\.gz)?", path.name.lower()):
         return _read_hgt(path, name)
     if path.suffix.lower() in _TIFF:
@@ -254,7 +254,7 @@ def _read_hgt(path: Path, name: str) -> ElevationRaster:
         raise ValueError(
             f"{name}: the name of an .hgt file must say its south-west corner, as N45W076.hgt does"
         )
-    data = _unpacked(path, name)
+    data = _unpack(path, name)
     nodes = math.isqrt(len(data) // 2)
     refuse_many_nodes(name, nodes, nodes)
     if nodes < 2 or 2 * nodes * nodes != len(data):
@@ -263,14 +263,14 @@ def _read_hgt(path: Path, name: str) -> ElevationRaster:
             "bytes each (1201 or 3601 of them in SRTM)"
         )
     rows = np.frombuffer(data, dtype=">i2").reshape(nodes, nodes)[::-1]
-    height, filled = filled_voids(np.where(rows == _VOID, np.nan, rows).astype(np.float32))
+    height, filled = fill_voids(np.where(rows == _VOID, np.nan, rows).astype(np.float32))
     south = int(match[2]) * (1.0 if match[1].upper() == "N" else -1.0)
     west = int(match[4]) * (1.0 if match[3].upper() == "E" else -1.0)
     step = 1.0 / (nodes - 1)
     return ElevationRaster(south, west, step, step, height, name, filled)
 
 
-def _unpacked(path: Path, name: str) -> bytes:
+def _unpack(path: Path, name: str) -> bytes:
     """Return the content of a file, or of the one .hgt in an archive."""
     refuse_many_nodes(name, 1, path.stat().st_size // 2)
     data = path.read_bytes()
@@ -321,7 +321,7 @@ def _read_geotiff(path: Path, name: str) -> ElevationRaster:
         )
     if transform.b or transform.d or transform.a <= 0.0 or transform.e >= 0.0:
         raise ValueError(f"{name} is turned or upside down: its rows must run from north to south")
-    height, filled = filled_voids(np.ma.filled(band.astype(np.float32), np.nan)[::-1])
+    height, filled = fill_voids(np.ma.filled(band.astype(np.float32), np.nan)[::-1])
     # The transform gives the corners of pixels; heights are those of their middles.
     west = transform.c + 0.5 * transform.a
     south = transform.f + (height.shape[0] - 0.5) * transform.e
@@ -333,11 +333,11 @@ _read_once = read_once(8)(read_raster)
 
 
 @lru_cache(maxsize=2)
-def _together(rasters: tuple[ElevationRaster, ...]) -> ElevationRaster:
+def _join_rasters(rasters: tuple[ElevationRaster, ...]) -> ElevationRaster:
     return mosaic(rasters)
 
 
-def _validated(value: Any) -> RasterOfFile:
+def _validate(value: Any) -> RasterOfFile:
     if isinstance(value, RasterOfFile):
         return value
     if isinstance(value, list) and not value:
@@ -345,20 +345,20 @@ def _validated(value: Any) -> RasterOfFile:
     paths, rasters = [], []
     for item in value if isinstance(value, list) else [value]:
         path = _PATH.validate_python(item)
-        name = shortened(str(path), 300)
+        name = shorten(str(path), 300)
         try:
             status_of(path, LARGEST_RASTER_BYTES)
             rasters.append(_read_once(path))
         except InputFileError as error:
             raise ValueError(f"must be a raster that can be read: {name}: {error}") from None
         paths.append(path)
-    return RasterOfFile(tuple(paths), _together(tuple(rasters)))
+    return RasterOfFile(tuple(paths), _join_rasters(tuple(rasters)))
 
 
-def _named(file: RasterOfFile) -> str | list[str]:
+def _file_names(file: RasterOfFile) -> str | list[str]:
     names = [str(path) for path in file.paths]
     return names[0] if len(names) == 1 else names
 
 
 #: An elevation raster, .hgt or GeoTIFF, or a list of such that lie side by side.
-RasterFile = Annotated[RasterOfFile, PlainValidator(_validated), PlainSerializer(_named)]
+RasterFile = Annotated[RasterOfFile, PlainValidator(_validate), PlainSerializer(_file_names)]

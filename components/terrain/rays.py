@@ -127,7 +127,7 @@ class Rays:
         ends = np.minimum(self.start_alt_m, self.end_alt_m)
         return np.where(sagging, np.minimum(self.points(share)[2], ends), ends)
 
-    def below(self, height_m: float) -> tuple[FloatArray, FloatArray]:
+    def shares_below(self, height_m: float) -> tuple[FloatArray, FloatArray]:
         """Return the shares of its length between which each ray may be below a height, (n,).
 
         Empty, with the first above the last, where it surely is not. The parabola stands for the
@@ -177,7 +177,7 @@ _COMB = (np.arange(16) + 0.5) / 16.0 - 0.5
 _POINTS_AT_ONCE = 1 << 17
 
 
-def behind_the_limb(
+def is_behind_limb(
     own: Vector, other: Vector, *, surface_m: float = 0.0, refraction: str = "none"
 ) -> BoolArray:
     """Tell which rays dip below a surface of one height above the ellipsoid (m; 0 for the sea).
@@ -189,7 +189,7 @@ def behind_the_limb(
     return rays.lowest_height_m() < surface_m - _GRAZING_M
 
 
-def behind_terrain(
+def is_behind_terrain(
     own: Vector,
     other: Vector,
     raster: ElevationRaster,
@@ -201,7 +201,7 @@ def behind_terrain(
 
     The ray's height over the ellipsoid is compared with the bilinear ground under it at points
     half a node's spacing apart, the ends left out. Beside the raster no ground is known, and
-    nothing hides. Ends are as for `behind_the_limb`; `offset_m` is the height above the ellipsoid
+    nothing hides. Ends are as for `is_behind_limb`; `offset_m` is the height above the ellipsoid
     of the raster's zero.
 
     Notes
@@ -214,7 +214,7 @@ def behind_terrain(
     close; never for hidden where none does.
     """
     rays = rays_between(own, other, refraction)
-    first, last = rays.below(raster.highest_m + offset_m)
+    first, last = rays.shares_below(raster.highest_m + offset_m)
     hidden = np.zeros(len(first), dtype=bool)
     spacing = 0.5 * raster.spacing_m
     count = np.ceil(rays.length_m * np.maximum(last - first, 0.0) / spacing).astype(np.int64) + 1
@@ -256,7 +256,7 @@ def _meets_ground(
     step = np.arange(ends[-1]) - np.repeat(ends - number, number)
     # In the middles of equal pieces: never at an end, which may stand on the ground.
     share = first[ray] + (step + 0.5) / count[ray] * (last[ray] - first[ray])
-    stands = _stands_m(rays, ray, share, raster, offset_m)
+    stands = _terrain_above_ray_m(rays, ray, share, raster, offset_m)
     met: BoolArray = np.logical_or.reduceat(stands > _GRAZING_M, ends - number)
     # Where it is a near thing, once more with a finer comb around the points that were near.
     nearest_m = _COARSE * raster.largest_step_m + _sag_between_m(raster)
@@ -267,7 +267,7 @@ def _meets_ground(
         finer = share[some, np.newaxis] + piece[:, np.newaxis] * _COMB
         crossings = _crossings(rays, ray[some], share[some], piece, raster)
         finer = np.column_stack([finer, *crossings])
-        again = _stands_m(
+        again = _terrain_above_ray_m(
             rays, np.repeat(ray[some], finer.shape[1]), finer.ravel(), raster, offset_m
         )
         hit = ray[some[(again.reshape(finer.shape) > _GRAZING_M).any(axis=1)]]
@@ -296,14 +296,14 @@ def _crossings(
     return shares
 
 
-def _stands_m(
+def _terrain_above_ray_m(
     rays: Rays,
     ray: npt.NDArray[np.int64],
     share: FloatArray,
     raster: ElevationRaster,
     offset_m: float,
 ) -> FloatArray:
-    """Return how high the ground stands above rays, at shares of their lengths."""
+    """Return the height of the ground above rays, m, at shares of their lengths."""
     lat_rad, lon_deg, height = rays.points(share, ray)
     ground, _ = raster.height(lat_rad * DEG_PER_RAD, lon_deg)
     return ground + (offset_m - height)

@@ -8,7 +8,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray
 MOST_VOIDS = 0.05
 
 
-def filled_voids(height_m: FloatArray) -> tuple[FloatArray, int]:
+def fill_voids(height_m: FloatArray) -> tuple[FloatArray, int]:
     """Return heights (rows, columns) without their voids (NaN), and how many nodes were filled.
 
     Filled ground is as smooth as its rim lets it be: every node is the mean of its neighbours

@@ -104,8 +104,8 @@ def eo_ranges(printed: Cells) -> Made:
         elif case.climb_deg:
             set_from = calibrated("the climb, which is not printed", "cameras:CLIMB_DEG", p_of)
             rows += [
-                cell.beside(said, by_thesis[k], "km", climb, set_from),
-                cell.beside(
+                cell.compare(said, by_thesis[k], "km", climb, set_from),
+                cell.compare(
                     f"{name}, exact projection", exact[k], "km", climb, set_from,
                     because="the exact projection shows the wings of an aircraft that climbs at "
                     "us, where eq. 9-13 show its side (errata 9)"),
@@ -118,9 +118,9 @@ def eo_ranges(printed: Cells) -> Made:
                 "The table cuts its last digit off: 0.1 km are allowed for."
             )
             set_from = calibrated(what, p_of, front) if king else calibrated(what, p_of)
-            rows.append(cell.beside(said, by_thesis[k], "km", cut, set_from, tolerance=0.1))
+            rows.append(cell.compare(said, by_thesis[k], "km", cut, set_from, tolerance=0.1))
         rows.append(
-            literature[k].beside(f"{name}, against the literature", exact[k], "km", "", one_p)
+            literature[k].compare(f"{name}, against the literature", exact[k], "km", "", one_p)
         )
     for case, cell, ours in zip(CASES, literature, exact, strict=True):
         rows.append(
@@ -171,7 +171,7 @@ def eo_ranges(printed: Cells) -> Made:
 def _measured_king_air(printed: Cells, camera: Camera) -> list[Row]:
     """Return the ranges of a King Air of the measured size, with P = 1 and with more contrast."""
     return [
-        printed[f"literature {geometry.lower()} king air"].beside(
+        printed[f"literature {geometry.lower()} king air"].compare(
             f"{geometry}, King Air of the measured size, P = {gain:g}",
             float(camera_range_km(camera, area_m2, gain)), "km", "",
             predicted(f"the measured area, {area_m2:.1f} m², and P = {gain:g}",
@@ -198,7 +198,7 @@ def area_error(printed: Cells) -> Made:
     shape = predicted("eq. 15 alone: range goes with the square root of the area")
     more, less = np.sqrt(1.2) - 1.0, 1.0 - np.sqrt(0.8)
     rows = [
-        printed["error_m"].beside(
+        printed["error_m"].compare(
             f"error in range for +20 % area, {name}",
             1000.0 * (float(camera_range_km(camera, area * 1.2)) - km), "m",
             f'{root} "Approximately" 600 m, "for all detection ranges": 50 m are allowed for.',
@@ -211,11 +211,11 @@ def area_error(printed: Cells) -> Made:
     rows += [
         Row("detection range at which +20 % area are 600 m", 0.6 / more, "km",
             f"{root} Any range agrees somewhere; this is where."),
-        printed["low_share"].beside("error in range for +20 % area, smallest", 100.0 * more,
+        printed["low_share"].compare("error in range for +20 % area, smallest", 100.0 * more,
                                     "%", "", shape),
-        printed["high_share"].beside("error in range for -20 % area, largest magnitude",
+        printed["high_share"].compare("error in range for -20 % area, largest magnitude",
                                      100.0 * less, "%", "", shape),
-        *(printed[cell].beside(
+        *(printed[cell].compare(
             f"denominator of eq. 34 at the threshold, {which} of Table 4.4", 1e6 * km**2 * pixel,
             "m²", "R²·σ_h·σ_v at the detection range: a·x.", ranges)
           for cell, which, km in (("low", "smallest", near_km), ("high", "largest", far_km))),
@@ -284,7 +284,7 @@ def ir_ranges_refined(printed: Cells) -> Made:
     for cell, number in printed.items():
         name, key = cell.rsplit(" ", 1)
         file, field = f"{name}_refined", f"{key}_m2"
-        rows.append(number.beside(
+        rows.append(number.compare(
             f"Table 4.6, {IR_CLASSES[name][0]}, {key}", getattr(aircraft(file).ir, field), "m²",
             "", configured("the file", f"aircraft/{file}.toml:ir.{field}")))  # fmt: skip
     rows.append(

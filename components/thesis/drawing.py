@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from components.display.map_view import outline_of
-from components.display.symbols import gridded, styles_of
+from components.display.symbols import add_grid, styles_of
 from components.sensor import marks
 from components.thesis.scenes import SceneRun
 from dsa_des.arrays.types import AnyArray, FloatArray
@@ -46,7 +46,7 @@ def panels(
         figure.set_layout_engine("constrained")
         axes = list(figure.subplots(rows, columns, squeeze=False, **shared).flat)
         for one in axes:
-            gridded(one)
+            add_grid(one)
         yield axes
 
 
@@ -92,7 +92,7 @@ def true_positions(run: SceneRun, rows: dict[str, AnyArray]) -> tuple[FloatArray
     east, north = np.empty(len(rows["time_s"])), np.empty(len(rows["time_s"]))
     for name in np.unique(rows["target"].astype(str)):
         here = np.flatnonzero(rows["target"] == name)
-        east[here], north[here] = run.flights.at(str(name), rows["time_s"][here])
+        east[here], north[here] = run.flights.position_at(str(name), rows["time_s"][here])
     return east, north
 
 

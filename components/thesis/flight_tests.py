@@ -44,7 +44,7 @@ SCANS_IN_A_ROW = 10
 def rcs_classes(printed: Cells) -> Made:
     """Table 4.1: the RCS that the files in ``configs/aircraft`` hold."""
     rows = [
-        printed[file].beside(
+        printed[file].compare(
             f"RCS of the {name} (class {size})", aircraft(file).rcs_dbsm, "dBsm", "",
             configured(f"aircraft/{file}.toml", f"aircraft/{file}.toml:rcs_dbsm"))
         for file, (name, size) in TABLE_4_1.items()
@@ -79,16 +79,16 @@ def pd_at_averages(printed: Cells) -> Made:
     rows, off = [], []
     for (name, (dbsm, km)), ours in zip(CLASSES.items(), by_small, strict=True):
         quantity = f"Pd of the {name} class at {km:.2f} km"
-        rows.append(printed[f"pd_{name}"].beside(
+        rows.append(printed[f"pd_{name}"].compare(
             quantity, ours, "", "The last digits of both ranges and both Pd are allowed for.",
             _basis(name), tolerance=_rounding(sensor, dbsm, km)))  # fmt: skip
-        off.append(printed[f"off_{name}"].beside(
+        off.append(printed[f"off_{name}"].compare(
             f"how far Pd of the {name} class is off 0.9 (§5.1.3)", 100.0 * abs(ours - 0.9), "%",
             "Percentage points, as there.", _basis(name), again=quantity))  # fmt: skip
     rows += off
     to_all = calibrated(f"one bandwidth, {fitted_hz:.0f} Hz, fitted to all three values")
     rows += [
-        printed[f"pd_{name}"].beside(
+        printed[f"pd_{name}"].compare(
             f"the same by one least-squares bandwidth, {name} at {km:.2f} km", ours, "",
             "The residuals are reported and not used.", to_all,
             because="the three printed values contradict one another (errata 17)")
@@ -99,7 +99,7 @@ def pd_at_averages(printed: Cells) -> Made:
             "Not printed; from 0.9114 at 6.91 km (errata 6)."),
         Row("bandwidth by least squares over the three classes", fitted_hz, "Hz",
             "For the residuals only."),
-        *_what_large_would_need(printed, sensor.false_alarm_probability, budget),
+        *_requirements_of_large(printed, sensor.false_alarm_probability, budget),
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
@@ -138,7 +138,7 @@ def _rounding(sensor: SwerlingParameters, rcs_dbsm: float, range_km: float) -> f
     return float(abs(near - far) + 1e-4)
 
 
-def _what_large_would_need(printed: Cells, pfa: float, budget: LinkBudget) -> list[Row]:
+def _requirements_of_large(printed: Cells, pfa: float, budget: LinkBudget) -> list[Row]:
     """Return at which range, or with which RCS, the large class would have the printed Pd."""
     dbsm, km = CLASSES["large"]
     needed = required_snr(printed["pd_large"].value, false_alarm_probability=pfa)
@@ -147,9 +147,9 @@ def _what_large_would_need(printed: Cells, pfa: float, budget: LinkBudget) -> li
     why = "Where our curve has 0.8668 (errata 17)."
     said = f"Pd of the large class at {km:.2f} km"
     return [
-        printed["range_large"].beside("range at which the large class has Pd 0.8668",
+        printed["range_large"].compare("range at which the large class has Pd 0.8668",
                                       range_m / 1000.0, "km", why, _basis("large"), again=said),
-        printed["rcs_large"].beside("RCS that has Pd 0.8668 at 9.75 km",
+        printed["rcs_large"].compare("RCS that has Pd 0.8668 at 9.75 km",
                                     10.0 * math.log10(needed / there), "dBsm", why,
                                     _basis("large"), again=said),
     ]  # fmt: skip
@@ -177,7 +177,7 @@ def detection_ranges(printed: Cells) -> Made:
         "thesis/table_4_2.toml:blocks.traffic",
     )
     rows = [
-        printed[name].beside(
+        printed[name].compare(
             f"average of Table 4.2, {name}", float(flown[name].mean()), "km",
             "The thesis averaged nautical miles before it rounded (errata 17): the last "
             "digits of cells and average are allowed for.",
@@ -187,18 +187,18 @@ def detection_ranges(printed: Cells) -> Made:
     ]  # fmt: skip
     for name, (first, held) in simulated.items():
         rows += [
-            printed[name].beside(
+            printed[name].compare(
                 f"simulated average of the first detection, {name}", float(first.mean()), "km",
                 "15 km is the radar's reach, where every flight is looked at first.", flights,
                 because="at Pfa 0.05 per look a first detection comes early, and the thesis does "
                 "not say when a flight test counted as a detection"),
-            printed[name].beside(
+            printed[name].compare(
                 f"simulated average from which every scan detects, {name}", float(held.mean()),
                 "km", "The other extreme: no scan misses from there on.", flights,
                 because="it is the other extreme: Pd is 0.9 near the printed average, so single "
                 "scans still miss there"),
         ]  # fmt: skip
-    rows += _declared(printed, runs, flown)
+    rows += _declared_rows(printed, runs, flown)
 
     def draw(path: Path) -> None:
         bins = np.arange(0.0, 15.5, 0.5)
@@ -232,7 +232,7 @@ def detection_ranges(printed: Cells) -> Made:
     return Made(rows, made.pictures, {"table_4_2_simulated": data})
 
 
-def _declared(
+def _declared_rows(
     printed: Cells, runs: list[ThesisRecording], flown: Mapping[str, FloatArray]
 ) -> list[Row]:
     """Return the averages by the rule of declaration that gives the small class's."""
@@ -241,7 +241,7 @@ def _declared(
     said = f"declared by {least} detections in {least} scans"
     of, radar = "flight_tests:SCANS_IN_A_ROW", "thesis/table_4_2.toml:blocks.radar.calibrate"
     rows = [
-        printed["small"].beside(
+        printed["small"].compare(
             f"simulated average, {said}, small", averages["small"], "km",
             "Of all rules up to 12 scans the nearest; allowed is a scan, 0.15 km of closing.",
             calibrated("the rule", of), tolerance=0.15,
@@ -249,7 +249,7 @@ def _declared(
     ]  # fmt: skip
     for name in ("medium", "large"):
         error_km = float(flown[name].std(ddof=1)) / len(flown[name]) ** 0.5
-        rows.append(printed[name].beside(
+        rows.append(printed[name].compare(
             f"simulated average, {said}, {name}", averages[name], "km",
             f"The allowance is the standard error of {len(flown[name])} flights' average, "
             f"{error_km:.2f} km.",

@@ -28,7 +28,7 @@ from dsa_des.arrays.types import AnyArray
 from dsa_des.block.mark import BLUE, ORANGE
 
 
-def _joined(
+def _concatenate(
     seen: Mapping[Any, Mapping[str, AnyArray]], keys: Iterable[str], name: str = ""
 ) -> dict[str, AnyArray]:
     """Return columns of several tables end to end, and of which one each row is."""
@@ -56,7 +56,7 @@ def fields_of_view(printed: Cells) -> Made:
                           f"thesis/fig_4_17.toml:blocks.{name}.azimuth_deg")  # fmt: skip
         azimuth = np.degrees(seen[name]["true_azimuth_rad"])
         for side, ours in (("right", azimuth.max()), ("left", -azimuth.min())):
-            rows.append(printed[name].beside(
+            rows.append(printed[name].compare(
                 f"outermost detection to the {side}, {name}", float(ours), "deg",
                 f"The intruder moves {STEP_DEG:.2f}° per scan.", edge,
                 tolerance=STEP_DEG))  # fmt: skip
@@ -80,7 +80,7 @@ def fields_of_view(printed: Cells) -> Made:
             for one in axes[1:]:
                 one.set_ylabel("")
 
-    data = _joined(seen, ("block", "time_s", "true_azimuth_rad", "true_range_m"))
+    data = _concatenate(seen, ("block", "time_s", "true_azimuth_rad", "true_range_m"))
     caption = (
         "All three sensors' fields of view: the ownship (star) is stationary, the intruder circles "
         "it, and circles mark where each sensor detects it. The range of a field of view is only "
@@ -163,7 +163,7 @@ def angular_resolution(printed: Cells) -> Made:
         reported = np.unique(np.round(np.degrees(seen[step]["azimuth_rad"]), 9))
         error = np.degrees(seen[step]["azimuth_rad"] - seen[step]["true_azimuth_rad"])
         rows += [
-            printed[cell].beside(
+            printed[cell].compare(
                 f"spacing of the reported azimuths at {step:g}°", float(np.diff(reported).min()),
                 "deg", "Rounded to the sensor's grid (§3.5.1).", grid),
             Row(f"largest azimuth error at {step:g}°", float(np.abs(error).max()), "deg",
@@ -185,7 +185,7 @@ def angular_resolution(printed: Cells) -> Made:
             legend_below(axes[0])
 
     keys = ("time_s", "azimuth_rad", "true_azimuth_rad", "range_m", "true_range_m")
-    data = _joined(seen, keys, "resolution_deg")
+    data = _concatenate(seen, keys, "resolution_deg")
     caption = (
         "What happens when the angular resolution of a sensor is changed: reported positions lie "
         "on rays of the grid (grey)."
@@ -229,7 +229,7 @@ def two_fields_of_view(_: Cells) -> Made:
 
     east, north = zip(*(true_positions(done, rows) for rows in fused.values()), strict=True)
     data = {
-        **_joined(fused, ("time_s",), "sensors"),
+        **_concatenate(fused, ("time_s",), "sensors"),
         "east_km": np.concatenate(east),
         "north_km": np.concatenate(north),
     }
@@ -258,15 +258,15 @@ def scan_rate(printed: Cells) -> Made:
     clock = predicted("a run on this machine", "thesis/fig_4_21.toml:blocks")
     against = "time of the whole simulation, against"
     rows = [
-        printed["steps"].beside(
+        printed["steps"].compare(
             "steps of the timed scene", scans, "", "",
             configured("180 s at 10 Hz", "thesis/fig_4_21.toml:duration_s",
                        "thesis/fig_4_21.toml:blocks.radar.scan_rate_hz")),
-        printed["intruders"].beside(
+        printed["intruders"].compare(
             "intruders of the timed scene", len(timed.flights.targets), "", "",
             configured("the scene's traffic", "thesis/fig_4_21.toml:blocks.traffic.intruders")),
-        printed["wall_s"].beside(f"{against} §4.5", timed.wall_s, "s", why, clock),
-        printed["wall_later_s"].beside(f"{against} §5.1.3", timed.wall_s, "s", why, clock,
+        printed["wall_s"].compare(f"{against} §4.5", timed.wall_s, "s", why, clock),
+        printed["wall_later_s"].compare(f"{against} §5.1.3", timed.wall_s, "s", why, clock,
                                        again=f"{against} §4.5"),
         Row("target-scans per second", STEPS * INTRUDERS * SENSORS / timed.wall_s, "1/s",
             "4 × 1800 × 3 sensors over our time; 7200: over the thesis's 3 s (errata 24).",
@@ -284,7 +284,9 @@ def scan_rate(printed: Cells) -> Made:
             axes[1].set_ylabel("")
             legend_below(axes[0])
 
-    data = _joined(seen, ("target", "time_s", "true_azimuth_rad", "true_range_m"), "scan_rate_hz")
+    data = _concatenate(
+        seen, ("target", "time_s", "true_azimuth_rad", "true_range_m"), "scan_rate_hz"
+    )
     caption = (
         "Influence of the scan rate: four intruders, radar at two scan rates. The thesis timed "
         "this scenario over 1800 time steps."
@@ -303,7 +305,7 @@ def unsynchronised(printed: Cells) -> Made:
     gated = run(scene("thesis/fig_4_22", "blocks.fusion.coincidence_s=0.1"))
     with_gate = len(gated.rows("fused", block="fusion", sensors="radar+ir")["time_s"])
     rows = [
-        printed["share"].beside(
+        printed["share"].compare(
             "share of IR detections fused with the radar's", together / (alone + together), "",
             "Scans k/2 s and k/5 s meet every second: at every second IR scan (errata 25).",
             predicted("the printed scan rates, 5 and 2 Hz, both from time 0 (assumption)",
@@ -336,6 +338,6 @@ def unsynchronised(printed: Cells) -> Made:
             times.set_xlabel("time (s)")
             legend_below(plan, 5, without="ownship")
 
-    data: Columns = _joined(fused, ("time_s",), "sensors")
+    data: Columns = _concatenate(fused, ("time_s",), "sensors")
     caption = "Scenario with two sensors with different scan rates, which are not synchronised."
     return Made.with_figure(rows, "fig_4_22", caption, draw, data)

@@ -23,7 +23,7 @@ ABOVE_M = (200, 400, 800)
 _DURATION_S = 260
 
 
-def flown() -> dict[str, Any]:
+def fly_overtaking() -> dict[str, Any]:
     """Run the scene fig_4_14 with every aircraft, to every side and at every height.
 
     By column: the range within which the EO camera joins, and the flight.
@@ -34,7 +34,7 @@ def flown() -> dict[str, Any]:
     return {"aircraft": file, "left_m": left_m, "above_m": above_m, "joins_km": joins_km}
 
 
-def spread(flights: dict[str, Any], printed: Printed) -> tuple[list[Row], Picture]:
+def overtaking_spread(flights: dict[str, Any], printed: Printed) -> tuple[list[Row], Picture]:
     """Return nearest and farthest range of each aircraft, and the figure."""
     where = (
         f"Passing {LEFT_M[0]} to {LEFT_M[-1]} m to the left, {ABOVE_M[0]} to {ABOVE_M[-1]} m above."
@@ -102,10 +102,10 @@ def overtaking(printed: Cells) -> Made:
     alone = ~with_eo
     why = "The scene fig_4_14; sensors as in sensors/oasys.toml and sensors/afrl_eo.toml."
     grid = "Rounding to the grid errs by half a step at most."
-    flights = flown()
-    others, figure = spread(flights, printed["joins_km"])
+    flights = fly_overtaking()
+    others, figure = overtaking_spread(flights, printed["joins_km"])
     rows = [
-        printed["joins_km"].beside(
+        printed["joins_km"].compare(
             "range within which the EO camera joins, in the flight drawn", joins_km, "km",
             "A King Air 1300 m to the left and 400 m above, chosen in round numbers so that it "
             "comes near; 0.15 km, two scans, are allowed for.",

@@ -185,28 +185,28 @@ def specified_range(printed: Cells) -> Made:
 
     flown = predicted("the radar calibrated to the flight tests", "sensors/oasys.toml:calibrate")
     rows = [
-        range_.beside("3.5 statute miles", STATUTE_KM, "km", "",
+        range_.compare("3.5 statute miles", STATUTE_KM, "km", "",
                       predicted("1 statute mile = 1.609344 km")),
-        range_.beside(
+        range_.compare(
             "first detection of 5 m² by a threshold radar set to 6.48 km", first_km, "km",
             "The scene sec_4_1_1: 50 m/s and 1 Hz, so the first scan inside is up to 0.05 km "
             "nearer.", calibrated("the threshold of the radar of scene sec_4_1_1",
                                   "thesis/sec_4_1_1.toml:blocks.radar.calibrate.range_km"),
             tolerance=0.05),
-        pd.beside("Pd of 5 m² at 6.48 km, nautical miles", pd_of(nautical, 6.48), "", "",
+        pd.compare("Pd of 5 m² at 6.48 km, nautical miles", pd_of(nautical, 6.48), "", "",
                   calibrated("the bandwidth, here to 3.5 nautical miles", "radar:NAUTICAL_KM")),
-        pd.beside("Pd of 5 m² at 5.63 km, specification", pd_of(specification, STATUTE_KM), "",
+        pd.compare("Pd of 5 m² at 5.63 km, specification", pd_of(specification, STATUTE_KM), "",
                   "Calibrated to Table 2.2's 5.6 km.",
                   calibrated("the bandwidth of the specification",
                              "sensors/oasys_specification.toml:calibrate.pd")),
-        specified.beside("range of Pd 0.9 for 5 m², specification",
+        specified.compare("range of Pd 0.9 for 5 m², specification",
                          range_of_pd_km(specification, RCS_DBSM), "km", "",
                          calibrated("the bandwidth of the specification",
                                     "sensors/oasys_specification.toml:calibrate.range_km")),
-        specified.beside("range of Pd 0.9 for 5 m², flight test",
+        specified.compare("range of Pd 0.9 for 5 m², flight test",
                          range_of_pd_km(flight, RCS_DBSM), "km",
                          "It serves every other figure.", flown),
-        pd.beside("Pd of 5 m² at 6.48 km, flight test", pd_of(flight, 6.48), "", "", flown),
+        pd.compare("Pd of 5 m² at 6.48 km, flight test", pd_of(flight, 6.48), "", "", flown),
     ]  # fmt: skip
     rows += [
         Row(f"bandwidth, {name}", sensor.link_budget().bandwidth_hz, "Hz",

@@ -13,7 +13,7 @@ from components.thesis.table import ITEMS, Item, chosen
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.files.output_file import check_file, write_file
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.files.output_names import named
+from dsa_des.files.output_names import user_path
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say, say_json
@@ -31,10 +31,10 @@ def reproduce_items(
     wanted = chosen(items)
     if page is not None and len(wanted) < len(ITEMS):
         raise UsageError("--page shows all items: leave the ITEMs out")
-    shown_on = None if page is None else named(page, "--page")
+    shown_on = None if page is None else user_path(page, "--page")
     if shown_on is not None:
         check_file(shown_on, "--page")
-    target = OutputFolder.chosen(out, Path("runs"), "thesis")
+    target = OutputFolder.from_option(out, Path("runs"), "thesis")
     started = time.perf_counter()
     with target.writing() as folder:
         results, failures = make(wanted)
@@ -56,7 +56,7 @@ def reproduce_items(
 
 
 def make(wanted: list[Item]) -> tuple[Results, list[str]]:
-    """Return what became of each item, and what could not be computed."""
+    """Return the result of each item, and the items that could not be computed."""
     results: Results = []
     failures = []
     for item in wanted:
@@ -69,7 +69,7 @@ def make(wanted: list[Item]) -> tuple[Results, list[str]]:
         failures += [
             f"{item.name} could not be computed: {row.quantity} is {row.ours}"
             for row in made.rows
-            if not row.computed
+            if not row.has_value
         ]
     return results, failures
 
@@ -124,7 +124,7 @@ def _show(results: Results, target: Path) -> None:
                 short(row.ours),
                 "" if row.difference is None else short(row.difference, sign=True),
                 row.unit,
-                row.said,
+                row.verdict_text,
             )
     console.print(shown)
     console.print()

@@ -70,19 +70,19 @@ class Row:
     again: str = ""
 
     @property
-    def computed(self) -> bool:
+    def has_value(self) -> bool:
         """Whether we have a number at all."""
         return math.isfinite(self.ours)
 
     @property
     def difference(self) -> float | None:
         """Our number less the printed one, in the row's unit."""
-        if self.printed is None or not self.computed:
+        if self.printed is None or not self.has_value:
             return None
         return self.ours - float(self.printed)
 
     @property
-    def allowed(self) -> float:
+    def allowed_difference(self) -> float:
         """Largest difference that agrees."""
         if self.tolerance is not None:
             return self.tolerance
@@ -90,11 +90,11 @@ class Row:
         return 0.5 * 10.0**-decimals
 
     @property
-    def near(self) -> bool:
+    def is_near(self) -> bool:
         """Whether our number and the printed one are within what is allowed for."""
         difference = self.difference
         # The last bits of a subtraction must not tip a number that lies on the edge.
-        return difference is not None and abs(difference) <= self.allowed * (1.0 + 1e-9)
+        return difference is not None and abs(difference) <= self.allowed_difference * (1.0 + 1e-9)
 
     @property
     def verdict(self) -> str:
@@ -103,7 +103,7 @@ class Row:
             return SILENT
         if self.basis is None:
             raise ValueError(f"{self.quantity}: printed {self.printed}, and no basis of ours")
-        if self.near:
+        if self.is_near:
             return self.basis.kind
         if not self.because:
             raise ValueError(
@@ -112,7 +112,7 @@ class Row:
         return DIFFERS
 
     @property
-    def said(self) -> str:
+    def verdict_text(self) -> str:
         """Return the verdict with its reason."""
         return f"{DIFFERS} {self.because}" if self.verdict == DIFFERS else self.verdict
 
@@ -149,7 +149,7 @@ class Row:
             "quantity": self.quantity,
             "printed": None if self.printed is None else float(self.printed),
             "derived": self.derived or None,
-            "ours": float(self.ours) if self.computed else None,
+            "ours": float(self.ours) if self.has_value else None,
             "unit": self.unit,
             "difference": self.difference,
             "verdict": self.verdict,
@@ -174,7 +174,7 @@ class Printed:
         """Return the number."""
         return float(self.text)
 
-    def beside(
+    def compare(
         self,
         quantity: str,
         ours: float,

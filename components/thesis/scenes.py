@@ -126,7 +126,7 @@ def _values(column: AnyArray | Text) -> AnyArray:
 
 def flights_of(simulation: Simulation) -> Flights:
     """Return where all aircraft are."""
-    result = Flights.of(simulation, {})
+    result = Flights.from_simulation(simulation, {})
     if result is None:
         raise UsageError(f"{simulation.scene.path}: has no traffic")
     return result

@@ -25,7 +25,7 @@ from components.optical.silhouette import visible_area
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.files.output_names import named
+from dsa_des.files.output_names import user_path
 from dsa_des.record.drawing import drawing, figure_text
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.scene.scene_file import read_scene_file
@@ -214,7 +214,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code: 0, or 2 when it cannot use what it was given."""
     options = _parser().parse_args(arguments)
     try:
-        out = OutputFolder(named(options.out))
+        out = OutputFolder(user_path(options.out))
         with out.writing() as folder:
             try:
                 comparisons = _compare(options)

@@ -79,10 +79,10 @@ def front_and_back(printed: Cells) -> Made:
         "(errata 12)."
     )
     rows = [
-        printed["back"].beside(
+        printed["back"].compare(
             "area shown at relative heading 0° (the back)", together[0], "m²", why,
             configured("the back sphere's area, a", "silhouettes:BACK_M2")),
-        printed["front"].beside(
+        printed["front"].compare(
             "area shown at relative heading 180° (the front)", together[180], "m²", why,
             configured("the front sphere's area, b", "silhouettes:FRONT_M2")),
         Row("area shown abeam, half of each", together[90], "m²", why),
@@ -112,13 +112,13 @@ def rotations(file: str, figure: str, _: Cells) -> Made:
         Row(f"shown share at {int(one.angle_deg[index])}°, rotation about {axis}, exact",
             float(one.model_share[index]), "", "Share of the model's own maximum.")
         for axis, index in (("x", 0), ("y", 0), ("z", 9))
-        for one in [_of(file, "exact", axis)]
+        for one in [_rotation_comparison(file, "exact", axis)]
     ]  # fmt: skip
     data: dict[str, Any] = {"angle_deg": result[0].angle_deg}
     for axis in AXES:
         for model in ("thesis", "exact"):
-            data[f"{model}_{axis}"] = _of(file, model, axis).model_share
-        data[f"union_{axis}"] = _of(file, "exact", axis).reference_share
+            data[f"{model}_{axis}"] = _rotation_comparison(file, model, axis).model_share
+        data[f"union_{axis}"] = _rotation_comparison(file, "exact", axis).reference_share
 
     def draw(path: Path) -> None:
         draw_comparison(result, path, title=NAMES[file])
@@ -134,11 +134,11 @@ def errors(printed: Cells) -> Made:
             predicted(f"Table 3.1's areas against {what}", f"aircraft/{file}.toml:eo")
             for what in ("the union of its bodies", f"the measured {SOURCE}")
         )
-        one = _of(file, "thesis", axis)
+        one = _rotation_comparison(file, "thesis", axis)
         cells = [printed[f"{file} {axis} {kind}"] for kind in _KINDS]
         names = [f"{kind} error, {NAMES[file]}, rotation about {axis}" for kind in _KINDS]
         rows += [
-            cell.beside(name, 100.0 * value, "%",
+            cell.compare(name, 100.0 * value, "%",
                         "Cameras every 10°, each signature as a share of its own maximum; "
                         "thesis's eq. 9-13.", bodies)
             for cell, name, value in zip(
@@ -146,7 +146,7 @@ def errors(printed: Cells) -> Made:
             )
         ]  # fmt: skip
         rows += [
-            cell.beside(f"{name}, against a measured table", 100.0 * value, "%",
+            cell.compare(f"{name}, against a measured table", 100.0 * value, "%",
                         f"Measured on {MEASURED_ON} with the command below; not made again here, "
                         "the table belongs to others.",
                         table, because=DIFFER[file], again=name)
@@ -166,7 +166,8 @@ def errors(printed: Cells) -> Made:
         },
         **{
             f"{model}_{kind}_percent": [
-                100.0 * getattr(_of(file, model, axis), f"{kind}_error") for file, axis in every
+                100.0 * getattr(_rotation_comparison(file, model, axis), f"{kind}_error")
+                for file, axis in every
             ]
             for model in ("thesis", "exact")
             for kind in ("mean", "max")
@@ -193,5 +194,5 @@ def _silhouette(file: str, model: str) -> Silhouette:
     return lambda *view: visible_area(*view, **known, model=model)
 
 
-def _of(file: str, model: str, axis: str) -> RotationComparison:
+def _rotation_comparison(file: str, model: str, axis: str) -> RotationComparison:
     return next(one for one in _comparisons(file) if (one.model, one.axis) == (model, axis))

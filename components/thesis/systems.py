@@ -60,10 +60,10 @@ def _tecvol(printed: Cells) -> tuple[list[Row], Picture, Columns]:
     errors = {name: _errors(runs, flights, name) for name in ("radar", "eo")}
     eo, radar = errors["eo"], errors["radar"]
     rows = [
-        printed["runs"].beside(
+        printed["runs"].compare(
             "Monte Carlo runs of TECVOL", len(runs), "", "",
             configured("seeds 0 to 99 of systems/tecvol.toml", "systems:REPLICAS")),
-        printed["eo_km"].beside(
+        printed["eo_km"].compare(
             "farthest EO detection of TECVOL", float(eo.range_km.max()), "km",
             "The intruder closes by 75 m per scan, which is allowed for.",
             configured("the camera's range boundary", "systems/tecvol.toml:blocks.eo.range_km")),
@@ -156,7 +156,7 @@ def _east_error_m(flights: Flights, seen: dict[str, FloatArray]) -> FloatArray:
     )
     ground = seen["range_m"] * np.cos(seen["ned_elevation_rad"])
     believed = own_east + ground * np.sin(seen["ned_azimuth_rad"])
-    east_km, _ = flights.at(target.name, seen["time_s"])
+    east_km, _ = flights.position_at(target.name, seen["time_s"])
     return np.asarray(believed - 1000.0 * east_km)
 
 
@@ -183,7 +183,7 @@ TABLE_2_3 = (
 )
 
 
-def _shown(target: str) -> str:
+def _show_target(target: str) -> str:
     """Return ``King Air`` for ``king_air``, ``large aircraft`` for ``large_aircraft``."""
     made_by_name = {"king_air": "King Air", "convair": "Convair", "1 m2": "1 m²"}
     return made_by_name.get(target, target.replace("_", " "))
@@ -233,7 +233,10 @@ def systems(printed: Cells) -> Made:
                 for (target, km), colour in zip(result.items(), _COLOURS, strict=False):
                     axes.barh(height, km, 0.8, color=colour)
                     axes.annotate(
-                        f" {_shown(target)}, {km:.2f} km", (km, height), va="center", fontsize=7
+                        f" {_show_target(target)}, {km:.2f} km",
+                        (km, height),
+                        va="center",
+                        fontsize=7,
                     )
                     height += 1.0
                 ticks.append(0.5 * (start + height - 1.0))
@@ -290,20 +293,20 @@ def _afrl(printed: Cells, runs: dict[str, SceneRun], first: dict[str, float]) ->
                      "systems/afrl.toml:blocks.centre.static_weight",
                      "systems/afrl.toml:blocks.traffic")  # fmt: skip
     return [
-        printed["pixels"].beside("AFRL, pixels in azimuth",
+        printed["pixels"].compare("AFRL, pixels in azimuth",
                                  sum(c["azimuth_pixels"] for c in cameras), "", why,
                                  of("azimuth_pixels")),
-        printed["field_deg"].beside(
+        printed["field_deg"].compare(
             "AFRL, field of view in azimuth",
             sum(c["azimuth_deg"][1] - c["azimuth_deg"][0] for c in cameras), "deg", why,
             of("azimuth_deg")),
-        printed["alarms_low"].beside("AFRL, false alarms per frame, low threshold",
+        printed["alarms_low"].compare("AFRL, false alarms per frame, low threshold",
                                      100.0 * low[alarms], "%", "Read as per frame (assumption).",
                                      of(alarms, "afrl_low_threshold")),
-        printed["alarms_high"].beside("AFRL, false alarms per frame, high threshold",
+        printed["alarms_high"].compare("AFRL, false alarms per frame, high threshold",
                                       100.0 * cameras[1][alarms], "%",
                                       "Read as per frame (assumption).", of(alarms)),
-        *(printed[f"first_{size}_nm"].beside(
+        *(printed[f"first_{size}_nm"].compare(
             f"AFRL, first detection of the {size} aircraft", first[name] / NAUTICAL_MILE_KM, "NM",
             f"Printed of the flight tests. {why}", seen)
           for size, name in (("small", "king_air"), ("large", "convair"))),
@@ -325,7 +328,7 @@ def _declarations(printed: Cells, done: SceneRun) -> list[Row]:
     rows = []
     for size, area_m2 in (("small", KING_AIR_M2["Level head-on"]), ("large", 90.0)):
         reached_km = (area_m2 / (pixel_sr * needed)) ** 0.5 / 1000.0
-        rows.append(printed[f"declared_{size}_nm"].beside(
+        rows.append(printed[f"declared_{size}_nm"].compare(
             f"AFRL, declaration of the {size} aircraft: Pd 0.9", reached_km / NAUTICAL_MILE_KM,
             "NM", f"Head-on, {area_m2:.1f} m², P = 1.",
             predicted("P = 1, Pd 0.5 at Table 4.4's ranges, and 0.01 % of false alarms a frame",
@@ -336,7 +339,7 @@ def _declarations(printed: Cells, done: SceneRun) -> list[Row]:
         pixels = BONANZA_M2 / (pixel_sr * (1000.0 * distance_nm * NAUTICAL_MILE_KM) ** 2)
         signature = camera.p.static_weight * pixels * camera.share(pixels)
         pd = detection_probability(signature, result.threshold, result.noise)
-        rows.append(printed[cell].beside(
+        rows.append(printed[cell].compare(
             f"AFRL, Pd of a Bonanza at {distance_nm:g} NM, high threshold", 100.0 * float(pd), "%",
             "Printed of an earlier study: 100 % below 3 NM, 90 % beyond.",
             predicted("the flight tests' camera", "systems:BONANZA_M2",
@@ -354,7 +357,7 @@ def _parca(printed: Cells) -> list[Row]:
     rows = []
     for cell, when, time_s in (("parca_before", "before", 10.0), ("parca_after", "after", 46.0)):
         at = int(np.searchsorted(tracks["time_s"], time_s))
-        rows.append(printed[cell].beside(
+        rows.append(printed[cell].compare(
             f"PaRCA, error of the range {when} the manoeuvre", 100.0 * float(share[at]), "%",
             "The standard deviation that the track states; printed of the flight tests.",
             predicted("a camera's errors, a first guess to 50 %, and S-turns of 45 degrees",
@@ -372,7 +375,7 @@ def _smart_uav(printed: Cells) -> list[Row]:
         name = file.partition("/")[2]
         label, rcs_dbsm = name.replace("_", " "), target["rcs_dbsm"]
         rows += [
-            printed[name].beside(f"RCS of the {label}", rcs_dbsm, "dBsm", "",
+            printed[name].compare(f"RCS of the {label}", rcs_dbsm, "dBsm", "",
                                  configured(f"{file}.toml", f"{file}.toml:rcs_dbsm")),
             Row(f"range of Pd 0.9 for the {label}",
                 range_of_pd_km(sensor, rcs_dbsm, model=f"swerling{target['swerling']}"), "km",

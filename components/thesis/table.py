@@ -39,7 +39,7 @@ class Item:
 def _texts(
     numbers: dict[str, str], tolerance: float | None = None, because: str = ""
 ) -> dict[str, Printed]:
-    """Return numbers of which the same is said."""
+    """Return printed numbers that share one remark."""
     return {name: Printed(text, tolerance, because) for name, text in numbers.items()}
 
 

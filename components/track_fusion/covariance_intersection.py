@@ -13,10 +13,10 @@ from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.state_tracks import DELETED, StateTracks
 from components.sensor.marks import FUSION
 from components.track_fusion.fused_tracks import (
-    fused_states,
-    no_fused_tracks,
-    reported_after,
+    empty_fused_tracks,
+    fuse_states,
     state_tracks,
+    update_reported,
 )
 from components.track_fusion.local_tracks import (
     LocalTracks,
@@ -27,7 +27,7 @@ from components.track_fusion.local_tracks import (
 from components.track_fusion.track_association import (
     MatchRules,
     leaders,
-    matched,
+    match_tracks,
     without_strays,
 )
 from dsa_des.arrays.keyed_table import KeyedTable, turns
@@ -159,8 +159,8 @@ class CovarianceIntersection(Component):
         self._records = records_of(np.empty(0, dtype=np.int64))
         #: By tracker: of each replica, the newest instant that it reported of.
         self._newest: dict[str, IntArray] = {}
-        self._local = LocalTracks.none()
-        self._reported = no_fused_tracks()
+        self._local = LocalTracks.without_tracks()
+        self._reported = empty_fused_tracks()
         self._tries = Tries()
 
     def undone(self) -> dict[str, IntArray]:
@@ -183,22 +183,27 @@ class CovarianceIntersection(Component):
         replica = wake.run[rows]
         records = self._records_of(np.unique(replica), came, row_of, wake)
         new, reported_at = self._reports(wake, came, row_of, records)
-        local, reported = self._local.of(records.replica), self._reported.of(records.replica)
+        local, reported = (
+            self._local.rows_of_runs(records.replica),
+            self._reported.rows_of_runs(records.replica),
+        )
         parts = []
         for at in turns(replica):
-            local, records = self._taken_in(
+            local, records = self._take_in(
                 local, records, new.take(np.isin(new.row, rows[at])), reported_at, rows[at],
                 replica[at],
             )  # fmt: skip
-            fused = self._fused(local, records, reported, rows[at], replica[at])
+            fused = self._fuse_tracks(local, records, reported, rows[at], replica[at])
             parts.append(fused)
             kept = fused.take(fused.track_status != DELETED)
-            reported = reported.after(replica[at], kept, wake.first_run)
+            reported = reported.replace_runs(replica[at], kept, wake.first_run)
         runs, first = records.replica, wake.first_run
-        self._records = self._records.after(runs, records, first)
-        self._local = self._local.after(runs, local, first)
-        self._reported = self._reported.after(runs, reported, first)
-        return state_tracks(KeyedTable.joined(parts), rows, wake.instants.take(rows), self.sensors)
+        self._records = self._records.replace_runs(runs, records, first)
+        self._local = self._local.replace_runs(runs, local, first)
+        self._reported = self._reported.replace_runs(runs, reported, first)
+        return state_tracks(
+            KeyedTable.concatenate(parts), rows, wake.instants.take(rows), self.sensors
+        )
 
     def _fresh(self, new: Arrivals, wake: Wake) -> Arrivals:
         """Return the reports that count: none that another one overtook, one at an instant."""
@@ -230,7 +235,7 @@ class CovarianceIntersection(Component):
             of, entries = of[sooner], entries[sooner]
             first[of] = row[entries]
             records.origin[:, of] = [getattr(message, column)[entries] for column in ORIGIN]
-        kept = self._records.continued(records)
+        kept = self._records.latest_or_new(records)
         return kept.with_columns(
             origin=np.where(np.isnan(kept.origin[0]), records.origin, kept.origin)
         )
@@ -253,7 +258,7 @@ class CovarianceIntersection(Component):
             came_now, of = local_tracks(message, replica, index, origin, masks, self.p.tentative)
             parts.append(came_now.with_columns(row=row[of]))
             reported_at[index] = row
-        return LocalTracks.joined(parts), reported_at
+        return LocalTracks.concatenate(parts), reported_at
 
     def _masks(self, sensors: Sequence[str]) -> list[int]:
         """Return the bit of each of a tracker's sensors among all."""
@@ -261,7 +266,7 @@ class CovarianceIntersection(Component):
         self.sensors = (*self.sensors, *unknown)
         return [1 << self.sensors.index(name) for name in sensors]
 
-    def _taken_in(
+    def _take_in(
         self,
         local: LocalTracks,
         records: KeyedTable,
@@ -275,7 +280,7 @@ class CovarianceIntersection(Component):
         gone = np.zeros(len(local), dtype=bool)
         for index, rows in enumerate(reported_at):
             gone |= (local.tracker == index) & np.isin(local.replica, replica[np.isin(at, rows)])
-        local = LocalTracks.joined([local.take(~gone), new])
+        local = LocalTracks.concatenate([local.take(~gone), new])
         records = with_newest(records, new, self._on_board)
         when = records.time_s[np.searchsorted(records.replica, local.replica)]
         now = np.isin(local.replica, replica)
@@ -283,13 +288,13 @@ class CovarianceIntersection(Component):
         idle, busy, when = local.take(~now), local.take(now & ~silent), when[now & ~silent]
         if len(busy):
             busy = without_strays(self._rules, busy, when)
-            busy, next_number = matched(
+            busy, next_number = match_tracks(
                 self._rules, busy, when, len(self.trackers), records.next_number, records.replica
             )
             records = records.with_columns(next_number=next_number)
-        return LocalTracks.joined([idle, busy]), records
+        return LocalTracks.concatenate([idle, busy]), records
 
-    def _fused(
+    def _fuse_tracks(
         self,
         local: LocalTracks,
         records: KeyedTable,
@@ -303,11 +308,11 @@ class CovarianceIntersection(Component):
             leader, of = leaders(mine)
             trackers = np.zeros(len(leader), dtype=np.int64)
             np.bitwise_or.at(trackers, of, np.int64(1) << mine.tracker)
-            self._tries = self._tries.with_more(mine.replica[leader], trackers, has_two(trackers))
-        before = reported.of(replica)
+            self._tries = self._tries.add_tries(mine.replica[leader], trackers, has_two(trackers))
+        before = reported.rows_of_runs(replica)
         when = records.time_s[np.searchsorted(records.replica, mine.replica)]
-        fused = fused_states(mine, when, self._rules.motion, self.p.rule)
+        fused = fuse_states(mine, when, self._rules.motion, self.p.rule)
         of = np.searchsorted(records.replica, fused.replica)
-        return reported_after(
+        return update_reported(
             before, fused, mine, records.origin[:, of], records.own_m[:, of], replica, at
         )

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from components.estimation.batched import product, product_transposed, times
-from components.estimation.covariance_intersection import Rule, intersected, inverse
+from components.estimation.batched import multiply_by_transpose, product, times
+from components.estimation.covariance_intersection import Rule, intersect_covariances, inverse
 from components.estimation.frame import SensorPose
-from components.estimation.measurement import Kind, linearised
+from components.estimation.measurement import Kind, linearise
 from components.estimation.motion import ConstantVelocity
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.state_tracks import (
@@ -24,7 +24,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import offsets_of
 
 
-def fused_states(
+def fuse_states(
     tracks: LocalTracks, time_s: FloatArray, motion: ConstantVelocity, rule: Rule
 ) -> KeyedTable:
     """Return the fused tracks to which tracks belong, by replica and number (``track``).
@@ -38,7 +38,7 @@ def fused_states(
     leader, of = leaders(tracks)
     count = len(leader)
     rank = _ranks(tracks, of)
-    state, covariance = tracks.at(time_s, motion)
+    state, covariance = tracks.predict_to(time_s, motion)
     x, p = state[:, leader].copy(), covariance[:, :, leader].copy()
     for turn in range(1, int(rank.max(initial=0)) + 1):
         member = np.flatnonzero((rank == turn) & tracks.ranged[leader[of]])
@@ -55,7 +55,7 @@ def fused_states(
                 weighed = angles.jacobian.swapaxes(0, 1) / angles.variance
                 information = product(weighed, angles.jacobian)
                 pull = times(weighed, angles.residual)
-            shift, result, _ = intersected(p[:, :, into], information, pull, rule)
+            shift, result, _ = intersect_covariances(p[:, :, into], information, pull, rule)
             x[:, into] += shift
             p[:, :, into] = result
     status = np.full(count, TENTATIVE)
@@ -105,14 +105,14 @@ _NUMBERS = (
 )  # fmt: skip
 
 
-def no_fused_tracks() -> KeyedTable:
+def empty_fused_tracks() -> KeyedTable:
     """Return the columns of no track."""
     shapes = {"state": (6,), "covariance": (6, 6), "own": (3,), "origin": (3,)}
     floats = dict.fromkeys((*_NUMBERS, *shapes), float)
     return KeyedTable.empty({**dict.fromkeys(_WHOLE, int), **floats, "has_range": bool}, shapes)
 
 
-def reported_after(
+def update_reported(
     before: KeyedTable,
     fused: KeyedTable,
     members: LocalTracks,
@@ -130,8 +130,8 @@ def reported_after(
     born_s[known] = before.born_s[old[known]]
     contributors[known] |= before.contributors[old[known]]
     axes = np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2)
-    seen, by_state = linearised(Kind(False), fused.state, SensorPose(own_m, axes))
-    spread = product_transposed(product(by_state, fused.covariance[:3, :3]), by_state)
+    seen, by_state = linearise(Kind(False), fused.state, SensorPose(own_m, axes))
+    spread = multiply_by_transpose(product(by_state, fused.covariance[:3, :3]), by_state)
     newest = members.take(fused.newest)
     azimuth, elevation = newest.direction()
     state_s = np.where(ranged, fused.state_s, newest.time_s)
@@ -159,7 +159,7 @@ def reported_after(
         row=row_of_replica[np.searchsorted(replica, last.replica)],
         track_status=np.full(len(last), DELETED),
     )
-    return KeyedTable.joined([last, new])
+    return KeyedTable.concatenate([last, new])
 
 
 def state_tracks(

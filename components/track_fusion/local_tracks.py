@@ -31,7 +31,7 @@ class LocalTracks(KeyedTable):
     """
 
     @classmethod
-    def none(cls) -> Self:
+    def without_tracks(cls) -> Self:
         """Return no tracks."""
         whole = ("replica", "tracker", "number", "system", "status", "contributors", "updated_by",
                  "row")  # fmt: skip
@@ -48,7 +48,9 @@ class LocalTracks(KeyedTable):
         trackers = 64
         return (self.replica * trackers + self.tracker) * _NUMBERS + self.number
 
-    def at(self, time_s: FloatArray, motion: ConstantVelocity) -> tuple[FloatArray, FloatArray]:
+    def predict_to(
+        self, time_s: FloatArray, motion: ConstantVelocity
+    ) -> tuple[FloatArray, FloatArray]:
         """Return states and covariances at instants (n,) that are not before their own."""
         return motion.predict(self.state, self.covariance, time_s - self.time_s)
 
@@ -115,13 +117,13 @@ def local_tracks(
         turn=change.turn,
         time_s=column("state_s"),
         updated_s=column("updated_s"),
-        contributors=_among_all(column("contributors"), masks),
-        updated_by=_among_all(column("updated_by"), masks),
+        contributors=_map_sensor_masks(column("contributors"), masks),
+        updated_by=_map_sensor_masks(column("updated_by"), masks),
     )
     return result, row
 
 
-def _among_all(mask: IntArray, masks: Sequence[int]) -> IntArray:
+def _map_sensor_masks(mask: IntArray, masks: Sequence[int]) -> IntArray:
     """Return masks over a tracker's own sensors as masks over those of all."""
     result = np.zeros(len(mask), dtype=np.int64)
     for i, bit in enumerate(masks):

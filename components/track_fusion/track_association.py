@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.association.assignment import gate_threshold, global_nearest
-from components.estimation.batched import cholesky, distance_squared, product, product_transposed
-from components.estimation.measurement import Kind, linearised, residual
+from components.estimation.batched import cholesky, distance_squared, multiply_by_transpose, product
+from components.estimation.measurement import Kind, linearise, residual
 from components.estimation.motion import ConstantVelocity
 from components.track_fusion.local_tracks import LocalTracks
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -50,7 +50,7 @@ def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Beari
     back_s = tracks.time_s - time_s
     then = state.copy()
     then[:3] += back_s * state[3:]
-    seen, by_position = linearised(_DIRECTION, then, tracks.pose())
+    seen, by_position = linearise(_DIRECTION, then, tracks.pose())
     measured = np.stack([tracks.azimuth_rad, tracks.elevation_rad])
     return Bearing(
         residual(measured, seen),
@@ -68,20 +68,20 @@ def gate_share(
     none = ~(leader.ranged | other.ranged)
     if both.any():
         mine, theirs = leader.take(both), other.take(both)
-        x, p = mine.at(time_s[both], rules.motion)
-        y, q = theirs.at(time_s[both], rules.motion)
+        x, p = mine.predict_to(time_s[both], rules.motion)
+        y, q = theirs.predict_to(time_s[both], rules.motion)
         share[both] = distance_squared(cholesky(p + q), x - y) / gate_threshold(
             rules.gate_probability, 6
         )
     two = gate_threshold(rules.gate_probability, 2)
     if one.any():
         swap = other.ranged & one
-        mine = LocalTracks.joined([leader.take(one & ~swap), other.take(swap)])
-        theirs = LocalTracks.joined([other.take(one & ~swap), leader.take(swap)])
+        mine = LocalTracks.concatenate([leader.take(one & ~swap), other.take(swap)])
+        theirs = LocalTracks.concatenate([other.take(one & ~swap), leader.take(swap)])
         when = np.concatenate([time_s[one & ~swap], time_s[swap]])
-        x, p = mine.at(when, rules.motion)
+        x, p = mine.predict_to(when, rules.motion)
         angles = bearing(theirs, x, when)
-        spread = product_transposed(product(angles.jacobian, p), angles.jacobian)
+        spread = multiply_by_transpose(product(angles.jacobian, p), angles.jacobian)
         for i in range(2):
             spread[i, i] += angles.variance[i]
         result = distance_squared(cholesky(spread), angles.residual) / two
@@ -89,7 +89,7 @@ def gate_share(
         where = np.concatenate([np.flatnonzero(one & ~swap), np.flatnonzero(swap)])
         share[where] = result
     if none.any():
-        share[none] = _between_bearings(rules, leader.take(none), other.take(none)) / two
+        share[none] = _bearing_distances(rules, leader.take(none), other.take(none)) / two
     return share
 
 
@@ -108,7 +108,7 @@ def _may_be_oneself(
     return np.asarray((on[ranged.tracker] != on[seen.tracker]) & (near <= gate))
 
 
-def _between_bearings(rules: MatchRules, one: LocalTracks, other: LocalTracks) -> FloatArray:
+def _bearing_distances(rules: MatchRules, one: LocalTracks, other: LocalTracks) -> FloatArray:
     apart = residual(np.stack(one.direction()), np.stack(other.direction()))
     turned = (rules.bearing_rate_rad_s * (one.time_s - other.time_s)) ** 2
     level = np.maximum(np.cos(one.elevation_rad) ** 2, 1e-12)
@@ -151,7 +151,7 @@ def without_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -
     return tracks.with_columns(system=system)
 
 
-def matched(
+def match_tracks(
     rules: MatchRules,
     tracks: LocalTracks,
     time_s: FloatArray,
@@ -170,7 +170,7 @@ def matched(
     for tracker in range(trackers):
         now = tracks.with_columns(system=system)
         mine = tracks.tracker == tracker
-        alone = _alone(now)
+        alone = _is_only_member(now)
         free = np.flatnonzero(mine & ((system == 0) | alone))
         if len(free) == 0:
             continue
@@ -185,7 +185,7 @@ def matched(
     return tracks.with_columns(system=system), next_number
 
 
-def _alone(tracks: LocalTracks) -> BoolArray:
+def _is_only_member(tracks: LocalTracks) -> BoolArray:
     """Return which tracks are the only member of their fused track."""
     result = np.zeros(len(tracks), dtype=bool)
     member = np.flatnonzero(tracks.system > 0)

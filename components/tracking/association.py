@@ -12,19 +12,24 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from components.association.assignment import alone, gate_threshold, global_nearest, nearest
+from components.association.assignment import (
+    gate_threshold,
+    global_nearest,
+    nearest,
+    unambiguous_pairs,
+)
 from components.association.jpda import marginals
-from components.estimation.batched import is_everything, log_determinant, selected
+from components.estimation.batched import is_everything, log_determinant, select_tracks
 from components.estimation.estimator import Estimates, innovation_squared
 from components.estimation.frame import SensorPose
 from components.estimation.iterated import iterate
 from components.estimation.modified_polar import (
-    moved_in_polar,
-    ranged_in_polar,
-    turned_about_vertical,
+    add_first_range,
+    correct_by_rotation,
+    correct_in_polar,
 )
 from components.tracking.gating import GatedPairs, log_density, log_gain
-from components.tracking.management import started
+from components.tracking.management import start_estimates
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import TELLS, LookBatch
 from components.tracking.track_store import TrackStore, estimate_columns
@@ -62,17 +67,17 @@ class Candidates:
     @cached_property
     def track(self) -> IntArray:
         """Index of each pair's track."""
-        return joined([one.track for one in self.kinds])
+        return concatenate([one.track for one in self.kinds])
 
     @cached_property
     def detection(self) -> IntArray:
         """Index of each pair's detection."""
-        return joined([one.detection for one in self.kinds])
+        return concatenate([one.detection for one in self.kinds])
 
     @cached_property
     def distance(self) -> FloatArray:
         """Squared Mahalanobis distance of each pair."""
-        return joined([one.measured.distance for one in self.kinds])
+        return concatenate([one.measured.distance for one in self.kinds])
 
     @cached_property
     def volume(self) -> FloatArray:
@@ -109,7 +114,7 @@ class Association(Protocol):
 class OneToOne(Association, Protocol):
     """Gives every track at most one detection, and every detection to at most one track."""
 
-    def taken(self, pairs: Candidates) -> IntArray:
+    def select_pairs(self, pairs: Candidates) -> IntArray:
         """Return the pairs that are taken, ascending; no track and no detection is in two."""
         ...
 
@@ -119,10 +124,10 @@ class OneToOne(Association, Protocol):
         hit, gain = np.zeros(len(part), dtype=bool), np.zeros(len(part))
         if not kinds:
             return part, hit, gain
-        if bool(alone(pairs.track, pairs.detection).all()):
+        if bool(unambiguous_pairs(pairs.track, pairs.detection).all()):
             taken = np.arange(len(pairs.track))
         else:
-            taken = self.taken(pairs)
+            taken = self.select_pairs(pairs)
         first = 0
         for one in kinds:
             last = first + len(one.track)
@@ -135,12 +140,12 @@ class OneToOne(Association, Protocol):
                 mine = mine[np.argsort(which)]
                 which = one.track[mine]
             estimates = rules.estimator.update(part.estimates(), which, one.measured, mine)
-            corrected(pairs, which, one, mine, estimates)
+            correct_by_pairs(pairs, which, one, mine, estimates)
             mask = sensors[one.detection[mine]]
             gain[which] = log_gain(rules, part, one, sensors)[mine]
             hit[which] = True
             before: dict[str, Any] = part.columns if is_everything(which, len(part)) else {
-                name: selected(part.columns[name], which)
+                name: select_tracks(part.columns[name], which)
                 for name in ("contributors", "ranged", "nis", "freedom", "weights")
             }  # fmt: skip
             nis = innovation_squared(one.measured, before["weights"], mine)
@@ -154,14 +159,14 @@ class OneToOne(Association, Protocol):
             }
             if one.own_m_s is not None:
                 new["own_m_s"] = one.own_m_s[:, mine]
-            part = part.put(which, new)
+            part = part.replace_columns(which, new)
         return part, hit, gain
 
 
 class Nearest(OneToOne):
     """Takes the nearest pair first."""
 
-    def taken(self, pairs: Candidates) -> IntArray:
+    def select_pairs(self, pairs: Candidates) -> IntArray:
         """Return the pairs that are taken."""
         return nearest(pairs.track, pairs.detection, pairs.distance)
 
@@ -169,7 +174,7 @@ class Nearest(OneToOne):
 class GlobalNearest(OneToOne):
     """Takes the pairs of the least sum over all (global nearest neighbour)."""
 
-    def taken(self, pairs: Candidates) -> IntArray:
+    def select_pairs(self, pairs: Candidates) -> IntArray:
         """Return the pairs that are taken."""
         cost = pairs.distance + pairs.volume
         return global_nearest(pairs.track, pairs.detection, cost, pairs.price)
@@ -202,10 +207,10 @@ class JointProbabilistic(Association):
         for one in kinds:
             which = np.arange(len(one.track))
             updated = rules.estimator.update(part.estimates(), one.track, one.measured, which)
-            corrected(pairs, one.track, one, which, updated)
+            correct_by_pairs(pairs, one.track, one, which, updated)
             updates.append(updated)
         merged = rules.estimator.merge(
-            part.estimates(), missed, track, share, Estimates.joined(updates)
+            part.estimates(), missed, track, share, Estimates.concatenate(updates)
         )
         hit = taken > 0.5
         order = np.lexsort((share, track))
@@ -237,7 +242,7 @@ ASSOCIATIONS: dict[str, Association] = {
 }  # fmt: skip
 
 
-def corrected(
+def correct_by_pairs(
     pairs: Candidates, track: IntArray, one: GatedPairs, pair: IntArray, estimates: Estimates
 ) -> None:
     """Bring corrections of tracks that no Gaussian along straight axes describes right, in place.
@@ -262,9 +267,9 @@ def corrected(
         iterate_far(pairs, track, one, pair, estimates, np.flatnonzero(straight))
         turn_coarse(part, track, own_m_s, pose, estimates)
         anew = np.flatnonzero(known & reports)
-        anew = anew[is_bent(part.take(track[anew]), pose.take(track[anew]))]
+        anew = anew[is_arc_bent(part.take(track[anew]), pose.take(track[anew]))]
         if len(anew):
-            begun = started(
+            begun = start_estimates(
                 pairs.rules, batch.scans, pose.take(track[anew]), batch.code[entry[anew]],
                 batch.detection[entry[anew]],
             )  # fmt: skip
@@ -274,16 +279,16 @@ def corrected(
     if one.kind.has_range or len(angle_only) == 0:
         return
     which = track[angle_only]
-    sensor_m = selected(pose.position_m, which)
+    sensor_m = select_tracks(pose.position_m, which)
     after = zip(estimates.states, estimates.covariances, strict=True)
     for before, (state, covariance) in zip(part.states(), after, strict=True):
-        moved = moved_in_polar(
-            selected(before, which), selected(state, angle_only),
-            selected(covariance, angle_only), sensor_m,
+        moved = correct_in_polar(
+            select_tracks(before, which), select_tracks(state, angle_only),
+            select_tracks(covariance, angle_only), sensor_m,
         )  # fmt: skip
         if one.ranges is not None:
             range_m, variance_m2 = (values[pair[angle_only]] for values in one.ranges)
-            moved = ranged_in_polar(*moved, range_m, variance_m2, sensor_m)
+            moved = add_first_range(*moved, range_m, variance_m2, sensor_m)
         state[:, angle_only], covariance[:, :, angle_only] = moved
 
 
@@ -295,7 +300,7 @@ def iterate_far(
     estimates: Estimates,
     which: IntArray,
 ) -> None:
-    """Repeat corrections `which` of those of `corrected` that went too far, in place."""
+    """Repeat corrections `which` of those of `correct_by_pairs` that went too far, in place."""
     if len(which) == 0:
         return
     of, mine, pose = track[which], pair[which], pairs.pose.take(track[which])
@@ -304,10 +309,18 @@ def iterate_far(
         # What sigma points say is no slope, and errors that states carry are judged by themselves.
         if slopes.spread.ndim > 2 or slopes.considered is not None or slopes.shared is not None:
             return
-        after = selected(estimates.states[m], which), selected(estimates.covariances[m], which)
-        before = selected(part.states()[m], of), selected(part.covariances()[m], of)
+        after = (
+            select_tracks(estimates.states[m], which),
+            select_tracks(estimates.covariances[m], which),
+        )
+        before = select_tracks(part.states()[m], of), select_tracks(part.covariances()[m], of)
         iterate(
-            one.kind, pose, before, after, slopes.take(mine), selected(measured.residuals[m], mine)
+            one.kind,
+            pose,
+            before,
+            after,
+            slopes.take(mine),
+            select_tracks(measured.residuals[m], mine),
         )
         estimates.states[m][:, which], estimates.covariances[m][:, :, which] = after
 
@@ -322,13 +335,14 @@ def turn_coarse(
     which = track[coarse]
     after = zip(estimates.states, estimates.covariances, strict=True)
     for before, (state, covariance) in zip(part.states(), after, strict=True):
-        state[:, coarse], covariance[:, :, coarse] = turned_about_vertical(
-            selected(before, which), selected(state, coarse), selected(covariance, coarse),
-            selected(pose.position_m, which), own_m_s[:, coarse],
+        state[:, coarse], covariance[:, :, coarse] = correct_by_rotation(
+            select_tracks(before, which), select_tracks(state, coarse),
+            select_tracks(covariance, coarse),
+            select_tracks(pose.position_m, which), own_m_s[:, coarse],
         )  # fmt: skip
 
 
-def is_bent(part: TrackStore, pose: SensorPose) -> BoolArray:
+def is_arc_bent(part: TrackStore, pose: SensorPose) -> BoolArray:
     """Return which tracks are spread so far across the line of sight that an arc is no line.
 
     At two deviations a straight line leaves it by `_BENT` of the deviation along it.
@@ -345,7 +359,7 @@ def is_bent(part: TrackStore, pose: SensorPose) -> BoolArray:
     return result
 
 
-def joined(parts: Sequence[Any]) -> Any:
+def concatenate(parts: Sequence[Any]) -> Any:
     """Return arrays end to end; a single one as it is."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 

@@ -55,7 +55,7 @@ class CueParameters(Parameters):
     )
 
     @model_validator(mode="after")
-    def _some_fit(self) -> Any:
+    def _check_cone_angles(self) -> Any:
         if self.least_half_angle_deg > self.most_half_angle_deg:
             raise ValueError(
                 f"least_half_angle_deg is {self.least_half_angle_deg:g}: it must be at most "
@@ -99,7 +99,7 @@ class Cues(Component):
         tracks = wake["tracks"]
         if tracks is None:
             return None
-        row, entry, half_rad = self._wanted(tracks)
+        row, entry, half_rad = self._cueing_tracks(tracks)
         rows = self._due(wake, np.bincount(row, minlength=len(tracks)) > 0)
         if not len(rows):
             return None
@@ -124,7 +124,7 @@ class Cues(Component):
             self._silent[of[now]] = ~some[rows[now]]
         return np.flatnonzero(due)
 
-    def _wanted(self, tracks: StateTracks) -> tuple[IntArray, IntArray, FloatArray]:
+    def _cueing_tracks(self, tracks: StateTracks) -> tuple[IntArray, IntArray, FloatArray]:
         """Return the row and entry of each track that cues, and its cone's half angle."""
         wanted = tracks.track_status != DELETED
         if not self.p.tentative:

@@ -6,14 +6,14 @@ from itertools import pairwise, product
 import numpy as np
 
 from components.association.assignment import gate_threshold
-from components.estimation.batched import selected
+from components.estimation.batched import select_tracks
 from components.estimation.estimator import PairMeasurement, log_mixture, pair_measurement
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
-from components.estimation.measurement import Kind, expected
+from components.estimation.measurement import Kind, expected_measurement
 from components.geometry import wrap_pi_unchecked
 from components.messages.state_tracks import COASTED, CONFIRMED
-from components.tracking.reported_errors import by_angles, levelled
+from components.tracking.reported_errors import by_angles, level_angles
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import TELLS, LookBatch, Scans, kind_of
 from components.tracking.track_store import TrackStore
@@ -49,7 +49,7 @@ class GatedPairs:
         return self.kind.has_range or self.ranges is not None
 
 
-def gated_pairs(
+def gate_pairs(
     rules: TrackerRules, part: TrackStore, of: IntArray, pose: SensorPose, batch: LookBatch
 ) -> tuple[list[GatedPairs], FloatArray | None, BoolArray]:
     """Return the pairs of predicted tracks and of detections in their gates, kind by kind.
@@ -82,7 +82,7 @@ def gated_pairs(
             direction = moments[0].expected[:2] if moments[0].left_over is None else None
             # The box of a kind that tells of errors is not about its gate, and decides itself.
             few = 0 if code & TELLS else _FEW_PAIRS
-            track, entry = _near(rules, kind, rows, moments, of, batch, mine, spread, few)
+            track, entry = _pairs_near(rules, kind, rows, moments, of, batch, mine, spread, few)
             if ranged is not None:
                 chosen = part.ranged[track] == ranged
                 track, entry = track[chosen], entry[chosen]
@@ -92,21 +92,22 @@ def gated_pairs(
             if len(track) == 0:
                 continue
             cells = batch.detection[entry]
-            measured = _picked(scans.measured, rows, cells)
+            measured = _values_at(scans.measured, rows, cells)
             own_m_s = None if rules.carried is None else np.full((3, len(cells)), np.nan)
             if rules.carried is not None and code & TELLS and ranged is not False:
-                own_m_s = rules.carried.own_m_s(scans, cells)
-                reported = rules.carried.reported(scans, cells).reported_by(
+                own_m_s = rules.carried.ownship_velocity_m_s(scans, cells)
+                reported = rules.carried.errors_of_detections(scans, cells).with_track_covariances(
                     part.covariance0.take(track, -1), part.state0[3:6].take(track, -1)
                 )
                 white = rules.carried.white(scans, cells, rows)
-                measured[:2], level_pose = levelled(measured[:2], pose.take(track))
+                measured[:2], level_pose = level_angles(measured[:2], pose.take(track))
                 mine_then = part.take(track)
                 since = np.maximum(mine_then.tick - mine_then.updated_tick, 0) / rules.ticks_per_s
                 ages = rules.carried.ages(scans, cells, since)
                 foreseen = [
                     replace(
-                        ages.added(result, model, state, covariance), considered=reported.considered
+                        ages.add_age_errors(result, model, state, covariance),
+                        considered=reported.considered_components,
                     )
                     for result, model, state, covariance in zip(
                         estimator.expect(kind, mine_then.estimates(), level_pose, reported),
@@ -146,7 +147,7 @@ def gated_pairs(
     return kinds, direction, held
 
 
-def _near(
+def _pairs_near(
     rules: TrackerRules,
     kind: Kind,
     rows: list[int],
@@ -166,20 +167,20 @@ def _near(
     many, first = counts[look], (counts.cumsum() - counts)[look]
     so_far = many.cumsum()
     if so_far[-1] <= few:
-        entry, track = _all_pairs(many, first)
+        entry, track = _enumerate_pairs(many, first)
         return track, mine[entry]
     threshold = gate_threshold(rules.widest_gate, kind.size)
     cells = batch.detection[mine]
-    measured = _picked(batch.scans.measured, rows[:3], cells)
-    variance = _picked(batch.scans.variance, rows[:3], cells)
+    measured = _values_at(batch.scans.measured, rows[:3], cells)
+    variance = _values_at(batch.scans.variance, rows[:3], cells)
     boxes = [_box(one, variance, threshold, spread.most) for one in moments]
     tracks, entries = [], []
     # In clutter there are more pairs than fit into memory at once.
     part = so_far // _MOST_PAIRS
     for begin, end in _parts(part):
-        entry, track = _all_pairs(many[begin:end], first[begin:end])
+        entry, track = _enumerate_pairs(many[begin:end], first[begin:end])
         entry += begin
-        kept = [_inside(*box, measured, entry, track) for box in boxes]
+        kept = [_pairs_in_gate_boxes(*box, measured, entry, track) for box in boxes]
         near = kept[0] if len(kept) == 1 else np.unique(np.concatenate(kept))
         tracks.append(track[near])
         entries.append(mine[entry[near]])
@@ -188,7 +189,7 @@ def _near(
     return np.concatenate(tracks), np.concatenate(entries)
 
 
-def _all_pairs(many: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
+def _enumerate_pairs(many: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
     """Return the entry and the track of each pair: so many tracks an entry, from a first one."""
     entry = np.arange(len(many)).repeat(many)
     before = many.cumsum() - many
@@ -205,18 +206,18 @@ class _PairVariance:
         #: What is added at most to each track's azimuth and elevation.
         self.most: FloatArray | None = None
         if self._unstated is not None:
-            _, elevation, range_m = expected(Kind(True), part.state0, pose)
+            _, elevation, range_m = expected_measurement(Kind(True), part.state0, pose)
             range2 = np.maximum(range_m, 1.0) ** 2
             level2 = np.maximum(np.cos(elevation), _LEAST_COS) ** 2
             self._by_m2 = np.stack([1.0 / (range2 * level2), 1.0 / range2])
             self.most = self._unstated.max() * self._by_m2
 
     def __call__(self, track: IntArray, cells: IntArray, rows: list[int]) -> FloatArray:
-        variance = _picked(self._scans.variance, rows, cells)
+        variance = _values_at(self._scans.variance, rows, cells)
         if self._unstated is not None:
             source = self._scans.source[:2][:, cells]
             across_m2 = np.where(source < 0, 0.0, self._unstated[source])
-            variance[:2] += across_m2 * selected(self._by_m2, track)
+            variance[:2] += across_m2 * select_tracks(self._by_m2, track)
         return variance
 
 
@@ -237,7 +238,7 @@ def _box(
     return expected, half
 
 
-def _inside(
+def _pairs_in_gate_boxes(
     expected: FloatArray, half: FloatArray, measured: FloatArray, entry: IntArray, track: IntArray
 ) -> IntArray:
     """Return which pairs lie in the boxes about the gates of one model."""
@@ -258,7 +259,7 @@ def _inside(
     return left
 
 
-def _picked(values: FloatArray, rows: list[int], cells: IntArray) -> FloatArray:
+def _values_at(values: FloatArray, rows: list[int], cells: IntArray) -> FloatArray:
     """Return some rows of values at some detections."""
     result = np.empty((len(rows), len(cells)))
     for i, row in enumerate(rows):
@@ -322,5 +323,5 @@ def log_gain(
 ) -> FloatArray:
     """Return ln(Pd N(z) / λ) of every pair."""
     density = log_density(rules, one, sensors)
-    mixed = log_mixture(selected(part.weights, one.track), one.measured.log_likelihoods)
+    mixed = log_mixture(select_tracks(part.weights, one.track), one.measured.log_likelihoods)
     return np.asarray(np.log(rules.p.detection_probability) + mixed - density)

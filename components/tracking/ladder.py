@@ -48,7 +48,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     mine = track[np.arange(len(entry)) - np.repeat(start - first, many)]
     if len(entry) == 0:
         return errors
-    error, back_s = _apart(fused, entry, tracks, mine, wake)
+    error, back_s = _track_errors(fused, entry, tracks, mine, wake)
     distance = np.sqrt((error**2).sum(axis=0))
     # The nearest of each entry's tracks, the first of equals.
     order = np.lexsort((distance, entry))
@@ -65,7 +65,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     return errors
 
 
-def _apart(
+def _track_errors(
     fused: FusedDetections, entry: IntArray, tracks: StateTracks, mine: IntArray, wake: Wake
 ) -> tuple[FloatArray, FloatArray]:
     """Return tracks less the true positions of entries, (3, pairs), and how far they went back."""
@@ -89,13 +89,13 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
     return {name: values[row, target] for name, values in measure(block, wake, block).items()}
 
 
-def _to_the_truth(values: AnyArray, reference: AnyArray) -> FloatArray:
+def _errors_to_truth(values: AnyArray, reference: AnyArray) -> FloatArray:
     return values
 
 
 _QUANTITIES = (
-    Quantity("position", "m", _to_the_truth),
-    Quantity("nees", "1", _to_the_truth),
+    Quantity("position", "m", _errors_to_truth),
+    Quantity("nees", "1", _errors_to_truth),
 )
 
 FILTER = Ladder(

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from components.estimation.batched import (
+    multiply_by_transpose,
     product,
-    product_transposed,
-    selected,
+    select_tracks,
     symmetric,
 )
 from components.estimation.estimator import Estimates
 from components.estimation.frame import SensorPose
-from components.estimation.kalman import innovation, updated
-from components.estimation.measurement import Kind, expected, linearised, position_of
+from components.estimation.kalman import innovation, update
+from components.estimation.measurement import Kind, expected_measurement, linearise, position_of
 from components.messages.state_tracks import COASTED, CONFIRMED, DELETED, TENTATIVE
 from components.tracking.promises import misdetection_counts, range_of
 from components.tracking.rules import LONGEST_WINDOW, TrackerRules
@@ -31,7 +31,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 LARGEST_SCORE = 20.0
 
 
-def judged(
+def judge_status(
     rules: TrackerRules,
     status: IntArray,
     history: IntArray,
@@ -42,7 +42,7 @@ def judged(
     """Return the status of tracks after a look: confirmed, coasted, deleted, or as it was."""
     tentative, new = status == TENTATIVE, status
     if tentative.any():
-        confirm, hopeless = _confirmed(rules, history, looks, score)
+        confirm, hopeless = _confirm_tentative(rules, history, looks, score)
         new = np.where(tentative & confirm, CONFIRMED, status)
         new = np.where(tentative & ~confirm & hopeless, DELETED, new)
     held = (new == CONFIRMED) | (new == COASTED)
@@ -52,13 +52,13 @@ def judged(
     return np.where(held & (misses >= rules.p.delete_misses), DELETED, new)
 
 
-def _confirmed(
+def _confirm_tentative(
     rules: TrackerRules, history: IntArray, looks: IntArray, score: FloatArray
 ) -> tuple[BoolArray, BoolArray]:
     """Return which tentative tracks are confirmed, and which can no longer be."""
     p = rules.p
     if p.initiation == "m_of_n":
-        hits = bits_set(history & (1 << p.confirm_n) - 1)
+        hits = count_bits(history & (1 << p.confirm_n) - 1)
         # What cannot come to m hits any more within its first n looks is dropped.
         left = p.confirm_n - np.minimum(looks, p.confirm_n)
         return hits >= p.confirm_m, hits + left < p.confirm_m
@@ -68,7 +68,7 @@ def _confirmed(
     return gained >= high, gained <= low
 
 
-def bits_set(values: IntArray) -> IntArray:
+def count_bits(values: IntArray) -> IntArray:
     """Return how many bits are 1 in numbers below 2^62."""
     v = values - (values >> 1 & 0x5555555555555555)
     v = (v & 0x3333333333333333) + (v >> 2 & 0x3333333333333333)
@@ -78,7 +78,7 @@ def bits_set(values: IntArray) -> IntArray:
     return np.asarray((v + (v >> 32)) & 0x7F, dtype=np.int64)
 
 
-def after_hits_and_misses(
+def update_history(
     history: IntArray, looks: IntArray, misses: IntArray, hit: BoolArray, missed: BoolArray
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Return history, looks and misses after a look that hit or missed some of the tracks."""
@@ -87,14 +87,14 @@ def after_hits_and_misses(
     return moved, looks + counted, np.where(hit, 0, misses + missed)
 
 
-def initiated(
+def initiate_tracks(
     rules: TrackerRules, batch: LookBatch, chosen: BoolArray, next_number: IntArray
 ) -> tuple[TrackStore, IntArray]:
     """Return a track for each of the chosen detections, and the next number of each replica."""
     scans, looks, replica = batch.scans, batch.look, batch.replica
     detection, of, codes = batch.detection[chosen], batch.of[chosen], batch.code[chosen]
     count, pose = len(detection), batch.pose(of)
-    estimates = started(rules, scans, pose, codes, detection)
+    estimates = start_estimates(rules, scans, pose, codes, detection)
     ranged = codes % 2 == 1
     counts = np.bincount(of, minlength=len(looks))
     within = np.arange(count) - (np.cumsum(counts) - counts)[of]
@@ -124,24 +124,26 @@ def initiated(
         seen=np.full((3, len(rules.fields), count), np.nan),
         seen_tick=np.full((len(rules.fields), count), -1),
         counted_tick=np.broadcast_to(tick, by.shape),
-        own_m_s=_own_of_coarse(rules, scans, codes, detection),
+        own_m_s=_ownship_velocity_of_coarse(rules, scans, codes, detection),
         **estimate_columns(estimates),
     )
-    status = judged(rules, born.status, born.history, born.looks, born.misses, born.score)
+    status = judge_status(rules, born.status, born.history, born.looks, born.misses, born.score)
     born = born.with_columns(
-        status=status, updated_m2=position_variance(born), **now_seen(rules, born, pose, mask)
+        status=status,
+        updated_m2=position_variance(born),
+        **last_seen_columns(rules, born, pose, mask),
     )
     return born, next_number + counts
 
 
-def started(
+def start_estimates(
     rules: TrackerRules, scans: Scans, pose: SensorPose, codes: IntArray, detection: IntArray
 ) -> Estimates:
     """Return what is known of a target by one detection alone, of several kinds `codes`."""
     count = len(detection)
     measured, variance = (
-        selected(scans.measured[:3], detection),
-        selected(scans.variance[:3], detection),
+        select_tracks(scans.measured[:3], detection),
+        select_tracks(scans.variance[:3], detection),
     )
     ranged = codes % 2 == 1
     mean, deviation = rules.start_range_m
@@ -151,7 +153,7 @@ def started(
     measured[2] = np.maximum(measured[2], np.sqrt(variance[2]))
     position, jacobian = position_of(measured, pose)
     spread = np.zeros((6, 6, count))
-    spread[:3, :3] = product_transposed(product(jacobian, _diagonal(variance)), jacobian)
+    spread[:3, :3] = multiply_by_transpose(product(jacobian, _diagonal(variance)), jacobian)
     spread[:3, :3] = 0.5 * (spread[:3, :3] + spread[:3, :3].swapaxes(0, 1))
     for i in range(3, 6):
         spread[i, i] = rules.p.start_speed_m_s**2
@@ -172,16 +174,16 @@ def started(
     return Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
 
 
-def _own_of_coarse(
+def _ownship_velocity_of_coarse(
     rules: TrackerRules, scans: Scans, codes: IntArray, detection: IntArray
 ) -> FloatArray:
     """Return how the ownship moved at detections with coarse bearings, (3, n); else NaN."""
     if rules.carried is None or scans.reported is None:
         return np.full((3, len(detection)), np.nan)
-    return np.where(codes & TELLS > 0, rules.carried.own_m_s(scans, detection), np.nan)
+    return np.where(codes & TELLS > 0, rules.carried.ownship_velocity_m_s(scans, detection), np.nan)
 
 
-def managed(
+def manage_tracks(
     rules: TrackerRules,
     part: TrackStore,
     changed: TrackStore,
@@ -201,11 +203,9 @@ def managed(
     misdetections = misdetection_counts(part.misdetections, by, looked)
     gain[~hit] = 0.0
     gain[missed] = np.log1p(-rules.p.detection_probability * rules.p.gate_probability)
-    history, count, misses = after_hits_and_misses(
-        part.history, part.looks, part.misses, hit, missed
-    )
+    history, count, misses = update_history(part.history, part.looks, part.misses, hit, missed)
     score = np.minimum(np.maximum(part.score + gain, -LARGEST_SCORE), LARGEST_SCORE)
-    status = judged(rules, part.status, history, count, misses, score)
+    status = judge_status(rules, part.status, history, count, misses, score)
     updated_tick = np.where(hit, changed.tick, changed.updated_tick)
     spread_m2, life_ticks = position_variance(changed), part.life_ticks
     updated_m2 = np.where(hit, spread_m2, part.updated_m2)
@@ -224,7 +224,7 @@ def managed(
         history=history, looks=count, misses=misses, score=score, misdetections=misdetections,
         updated_tick=updated_tick, status=np.where(ended, DELETED, status),
         life_ticks=life_ticks, updated_m2=updated_m2, counted_tick=counted_tick,
-        **now_seen(rules, changed, pose, by),
+        **last_seen_columns(rules, changed, pose, by),
     )  # fmt: skip
 
 
@@ -256,7 +256,7 @@ def _advice(late: bool) -> str:
     )
 
 
-def now_seen(
+def last_seen_columns(
     rules: TrackerRules, part: TrackStore, pose: SensorPose, mask: IntArray
 ) -> dict[str, Any]:
     """Return the columns of where tracks were last seen, changed by the sensors of a mask.
@@ -266,7 +266,7 @@ def now_seen(
     if rules.lasting is None or not (mask := mask & rules.lasting.sensors).any():
         return {}
     mine = (mask >> np.arange(len(part.misdetections))[:, np.newaxis] & 1).astype(bool)
-    here = expected(Kind(True), part.state0, pose)
+    here = expected_measurement(Kind(True), part.state0, pose)
     return {
         "seen": np.where(mine[np.newaxis], here[:, np.newaxis], part.seen),
         "seen_tick": np.where(mine, part.tick, part.seen_tick),
@@ -286,12 +286,15 @@ def _update_by_rates(
     if len(which) == 0:
         return
     kind, _ = kind_of(2)
-    known, slope = linearised(kind, selected(state, which), pose.take(which))
+    known, slope = linearise(kind, select_tracks(state, which), pose.take(which))
     cells = detection[which]
-    rate, variance = selected(scans.measured[3:4], cells), selected(scans.variance[3:4], cells)
-    result = innovation(known[2:], slope[2:], selected(covariance, which), variance)
-    state[:, which], covariance[:, :, which] = updated(
-        selected(state, which), selected(covariance, which), result, rate - known[2:]
+    rate, variance = (
+        select_tracks(scans.measured[3:4], cells),
+        select_tracks(scans.variance[3:4], cells),
+    )
+    result = innovation(known[2:], slope[2:], select_tracks(covariance, which), variance)
+    state[:, which], covariance[:, :, which] = update(
+        select_tracks(state, which), select_tracks(covariance, which), result, rate - known[2:]
     )
 
 
@@ -322,7 +325,7 @@ def _start_by_reports(
     if rules.carried is None or not len(telling):
         return state, covariance
     cells = detection[telling]
-    reported = rules.carried.reported(scans, cells)
+    reported = rules.carried.errors_of_detections(scans, cells)
     effects = reported.effects(state[:6, telling], pose.take(telling))
     effects[3:] *= (codes[telling] & 4) > 0
     white = rules.carried.white(scans, cells, [0, 1, 2, 4, 5, 6])
@@ -331,7 +334,7 @@ def _start_by_reports(
         own[i, i] = np.where(codes[telling] & 4, white[i], own[i, i])
     own[:3, :3] = _diagonal(white[:3])
     ages = rules.carried.ages(scans, cells, np.zeros(len(cells)))
-    own += product_transposed(effects, effects)
+    own += multiply_by_transpose(effects, effects)
     speeds = np.stack([own[i, i] for i in (3, 4, 5)])
     for model in rules.estimator.models:
         own += ages.errors(model, np.zeros((model.size, len(cells))), speeds)[0] / len(

@@ -72,7 +72,7 @@ class Past:
     def __len__(self) -> int:
         return len(self.before)
 
-    def split(self, runs: IntArray, first_run: int) -> tuple["Past", "Past"]:
+    def split_runs(self, runs: IntArray, first_run: int) -> tuple["Past", "Past"]:
         """Return the looks of some runs, and those of the others that go on."""
         run = self.scans.run
         mine = np.isin(run, runs)
@@ -81,7 +81,7 @@ class Past:
         return one, other
 
     @classmethod
-    def of(
+    def from_looks(
         cls, scans: Scans, looks: list[int], before: Mapping[int, Snapshot], others: "Past | None"
     ) -> "Past":
         """Return some looks, each with the tracks of its own run alone, and after them others."""
@@ -92,7 +92,7 @@ class Past:
         mine = scans.take(np.array(looks, dtype=np.int64))
         if others is None or not len(others):
             return cls(mine, kept)
-        return cls(Scans.joined([mine, others.scans]), kept + others.before)
+        return cls(Scans.concatenate([mine, others.scans]), kept + others.before)
 
 
 def plan_of_late(
@@ -160,7 +160,7 @@ def tracks_before(
         store = before[look].store
         by_store.setdefault(id(store), (store, []))[1].append(replica)
     parts = [store.take(np.isin(store.replica, mine)) for store, mine in by_store.values()]
-    return TrackStore.joined(parts).in_order()
+    return TrackStore.concatenate(parts).sort()
 
 
 # Looks whose fate is worked out.
@@ -185,7 +185,9 @@ def latest_s(offers: Mapping[str, Any], producers: Iterable[Producer]) -> Fracti
     return Fraction(max(late_s, default=0) + max((one.latest_s for one in producers), default=0))
 
 
-def left_out(offers: Mapping[str, Any], lag_s: Fraction, duration_s: Fraction) -> dict[str, float]:
+def late_look_shares(
+    offers: Mapping[str, Any], lag_s: Fraction, duration_s: Fraction
+) -> dict[str, float]:
     """Return the share of each sensor's looks that come when a look newer by a lag is known."""
     said = {
         name: (o.clock(), o.latest_s, o.jitter_s)
@@ -233,7 +235,7 @@ class LookCount:
     #: By name of the sensor: of each run those left out, and all (2, runs).
     counts: Mapping[str, IntArray] = field(default_factory=dict)
 
-    def of(
+    def with_looks(
         self, sensors: tuple[str, ...], looks: Scans, came: slice, left_out: IntArray | list[int]
     ) -> "LookCount":
         """Return the count with more of some looks: those that came, and those left out."""

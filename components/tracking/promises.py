@@ -20,12 +20,12 @@ import numpy as np
 
 from components.estimation.batched import squared_length
 from components.estimation.frame import SensorPose
-from components.estimation.measurement import Kind, expected
+from components.estimation.measurement import Kind, expected_measurement
 from components.messages.detections import SensorOffer
 from components.messages.reach import EVALUATE, Reach
 from components.messages.state_tracks import DELETED
 from components.tracking.scans import LookBatch
-from components.tracking.track_store import NEVER, TrackStore, tracks_after
+from components.tracking.track_store import NEVER, TrackStore, tracks_to_report
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -120,7 +120,7 @@ def expected_looks(
             continue
         if where is None:
             if direction is None:
-                direction = expected(Kind(False), part.state0, pose)
+                direction = expected_measurement(Kind(False), part.state0, pose)
             away = range_of(part, pose)
             where = (*direction, np.where(part.ranged, away, 0.0))
         inside = np.ones(len(part), dtype=bool)
@@ -169,7 +169,7 @@ class Silence:
         """When they are."""
         return self.instants.take(self.rows)
 
-    def before(self, row: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
+    def since_last_work(self, row: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
         """Return for works at some rows of the wake the silence since the work before it.
 
         It is the silent rows from the first to the second: none where the second is less. `worked`
@@ -182,7 +182,7 @@ class Silence:
         since[order[1:][again]] = at.tick[order[:-1][again]]
         return self._first(at.run, since), last_of_run(self.silent, at)
 
-    def after(self, run: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
+    def from_last_work(self, run: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
         """Return the silent rows of some runs from their last work on."""
         ends = next_of_run(self.silent, RunTicks(run + 1, np.zeros_like(run)))
         return self._first(run, worked), ends - 1
@@ -190,7 +190,7 @@ class Silence:
     def _first(self, run: IntArray, worked: IntArray) -> IntArray:
         return next_of_run(self.silent, RunTicks(run, worked + self.ticks_per_s))
 
-    def ended(
+    def end_silent_tracks(
         self, store: TrackStore, records: KeyedTable, first: IntArray, last: IntArray
     ) -> tuple[TrackStore, list[TrackStore]]:
         """Return the tracks that live on, and what is reported of the runs in which some do not.
@@ -211,5 +211,5 @@ class Silence:
             shown = (store.replica == self.silent.run[one]) & (store.status != DELETED)
             status = np.where(due & (row == one), DELETED, store.status)
             now = store.with_columns(status=status).take(shown & ~(due & (row < one)))
-            reported.append(tracks_after(now, records.take(mine), self.rows[[one]]))
+            reported.append(tracks_to_report(now, records.take(mine), self.rows[[one]]))
         return store.take(~due), reported

@@ -27,7 +27,7 @@ _LEAST_COS = 1e-3
 _COARSEST_DEG = 5.0
 
 
-def reported_errors(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], list[str]]:
+def errors_by_sensors(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], list[str]]:
     """Return the errors that sensors tell of, and whose they are: once for those of an aircraft."""
     result: dict[tuple[ToldError, str], list[str]] = {}
     for name, offer in sorted(offers.items()):
@@ -83,7 +83,7 @@ class CarriedErrors:
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "CarriedErrors":
         """Return those that some sensors tell of."""
-        errors = reported_errors(offers)
+        errors = errors_by_sensors(offers)
         mine = np.array([[name in whose for name in sensors] for whose in errors.values()])
         ranging = np.array([one.way in (BEARING, RANGE) for one, _ in errors])
         return cls(
@@ -92,7 +92,7 @@ class CarriedErrors:
             mine, (mine & ranging[:, np.newaxis]).any(axis=0),
         )  # fmt: skip
 
-    def reported(self, scans: Scans, cells: IntArray) -> ReportedErrors:
+    def errors_of_detections(self, scans: Scans, cells: IntArray) -> ReportedErrors:
         """Return the errors that some detections report."""
         assert scans.reported is not None
         source, reported = scans.source[0][cells], scans.reported[:, cells]
@@ -101,7 +101,7 @@ class CarriedErrors:
             self.ways, deviation, reported[TOLD.index("age_s")], self.at_range[source]
         )
 
-    def own_m_s(self, scans: Scans, cells: IntArray) -> FloatArray:
+    def ownship_velocity_m_s(self, scans: Scans, cells: IntArray) -> FloatArray:
         """Return the ownship's velocity (north, east, down) where a bearing is coarse, else NaN."""
         assert scans.reported is not None
         return scans.reported[TOLD.index("own_north") : TOLD.index("own_down") + 1, cells]
@@ -129,7 +129,7 @@ def by_angles(variance_m2: FloatArray, measured: FloatArray) -> FloatArray:
     return result
 
 
-def levelled(angles_rad: FloatArray, pose: SensorPose) -> tuple[FloatArray, SensorPose]:
+def level_angles(angles_rad: FloatArray, pose: SensorPose) -> tuple[FloatArray, SensorPose]:
     """Return azimuths and elevations (2, n) in body axes as ones in the frame's, and that pose.
 
     Bearings and heights are reported in level axes: there it is linear.

@@ -73,11 +73,11 @@ class LastingErrors:
         return sum(1 << i for i in np.flatnonzero(self.lasts).tolist())
 
     @cached_property
-    def _across(self) -> bool:
+    def _is_across_angles(self) -> bool:
         return bool(self.across_m2.any())
 
     @cached_property
-    def _shared(self) -> bool:
+    def _is_shared(self) -> bool:
         return bool(self.share.any())
 
     def common(
@@ -96,9 +96,9 @@ class LastingErrors:
         white, remembered = variance - rounding, 0.0
         if len(self.variance):
             lasting = _of_cells(self.variance, at)
-            if self._across:
+            if self._is_across_angles:
                 lasting = lasting + _of_cells(self.across_m2, at) / np.maximum(range_m, 1.0) ** 2
-            if self._shared:
+            if self._is_shared:
                 share = _of_cells(self.share, at)
                 stated = np.maximum(lasting + share * variance, 0.0)
                 lasting = np.where(share > 0.0, stated, lasting)
@@ -299,7 +299,7 @@ class TrackerRules:
         )
         assumed = p.assumed_range_m or 0.25 * farthest
         unstated = [o.unstated_across_m2 if isinstance(o, SensorOffer) else 0.0 for o in known]
-        used = [not why_no_range_rates(p, offer) for offer in known]
+        used = [not range_rate_refusal(p, offer) for offer in known]
         return cls(
             p, estimator, ticks_per_s, fields, log_densities(fields, p.false_alarms_per_scan),
             (assumed, 0.5 * assumed), sum(1 << i for i, one in enumerate(used) if one),
@@ -336,7 +336,7 @@ class TrackerRules:
         return float(getattr(self.p, "start_acceleration_m_s2", 3.0))
 
 
-def why_no_range_rates(p: TrackerParameters, offer: Any) -> str:
+def range_rate_refusal(p: TrackerParameters, offer: Any) -> str:
     """Return why range rates of a sensor with this offer are not used; empty where they are."""
     if not p.use_range_rate:
         return "use_range_rate is false"

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from components.estimation.batched import selected
+from components.estimation.batched import select_tracks
 from components.estimation.frame import SensorPose, vectors_in_frame
 from components.estimation.measurement import Kind
 from components.messages.columns import POSE, TOLD
@@ -77,14 +77,14 @@ class Scans:
         code = np.where(errs | moves, code & 1, code)
         return code + 4 * (moves & (tells | ~errs)) + TELLS * tells
 
-    def in_frame(self, origin_deg_m: FloatArray) -> Self:
+    def rotate_to_frame(self, origin_deg_m: FloatArray) -> Self:
         """Return the looks with targets' velocities along the axes of frames with some origins."""
         if np.isnan(self.measured[4:]).all():
             return self
         look = row_of_entries(self.offsets)
         measured = self.measured.copy()
-        places = selected(self.pose[:3], look)
-        measured[4:] = vectors_in_frame(selected(origin_deg_m, look), places, measured[4:])
+        places = select_tracks(self.pose[:3], look)
+        measured[4:] = vectors_in_frame(select_tracks(origin_deg_m, look), places, measured[4:])
         return replace(self, measured=measured)
 
     def take(self, looks: IntArray) -> Self:
@@ -95,14 +95,14 @@ class Scans:
         return type(self)(
             self.row[looks], self.run[looks], self.tick[looks], self.sensors[looks],
             self.tells_misses[looks],
-            selected(self.pose, looks), selected(self.velocity, looks), offsets,
-            selected(self.measured, which), selected(self.variance, which),
+            select_tracks(self.pose, looks), select_tracks(self.velocity, looks), offsets,
+            select_tracks(self.measured, which), select_tracks(self.variance, which),
             self.contributors[which], self.source.take(which, axis=-1),
-            None if self.reported is None else selected(self.reported, which),
+            None if self.reported is None else select_tracks(self.reported, which),
         )  # fmt: skip
 
     @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
+    def concatenate(cls, parts: Sequence[Self]) -> Self:
         """Return the looks of all parts, one after the other."""
         if len(parts) == 1:
             return parts[0]
@@ -130,7 +130,7 @@ class LookBatch:
     poses: SensorPose  # of every look of `scans`
 
     @classmethod
-    def of_looks(
+    def from_looks(
         cls, scans: Scans, look: IntArray, replica: IntArray, codes: IntArray, poses: SensorPose
     ) -> Self:
         """Return some looks, given the kinds of all detections and the poses of all looks."""
@@ -219,7 +219,7 @@ def scans_of(fused: FusedDetections) -> Scans:
         reported = np.array([fused.told_by_target[name] for name in TOLD])
     measured = np.array([*(getattr(fused, name) for name in _MEASURED), *reported[:3]])
     variance = np.array([*(getattr(fused, name) for name in _VARIANCES), *reported[3:6]])
-    seen_from = selected(poses, begins)
+    seen_from = select_tracks(poses, begins)
     _refuse(fused, measured, variance, seen_from)
     return Scans(
         row=key[0][begins],
@@ -230,9 +230,9 @@ def scans_of(fused: FusedDetections) -> Scans:
         pose=seen_from,
         velocity=_velocities(fused, of_entry, count),
         offsets=np.concatenate(([0], np.cumsum(np.bincount(of_entry, minlength=count)))),
-        measured=selected(measured, entries),
-        variance=selected(variance, entries),
-        reported=None if fused.told_by_target is None else selected(reported, entries),
+        measured=select_tracks(measured, entries),
+        variance=select_tracks(variance, entries),
+        reported=None if fused.told_by_target is None else select_tracks(reported, entries),
         contributors=mask[entries],
         source=np.array([fused.angle_source] * 2 + [fused.range_source] * 5)[:, entries],
     )
@@ -248,7 +248,7 @@ def _velocities(fused: FusedDetections, look: IntArray, count: int) -> FloatArra
     return velocity
 
 
-def when_made(
+def split_due_looks(
     scans: Scans, ahead: Scans | None, wake: Wake, wait_ticks: int = 0
 ) -> tuple[Scans, Scans | None]:
     """Return the looks that are due by the rows of a wake, in order, and those that wait.
@@ -259,7 +259,7 @@ def when_made(
     if ahead is None and not bool((scans.tick + wait_ticks > wake.ticks[scans.row]).any()):
         return scans, None
     if ahead is not None:
-        scans = Scans.joined([replace(ahead, row=np.full(len(ahead), -1)), scans])
+        scans = Scans.concatenate([replace(ahead, row=np.full(len(ahead), -1)), scans])
     due = RunTicks(scans.run, scans.tick + wait_ticks)
     row = np.maximum(scans.row, next_of_run(wake.instants, due))
     there = np.minimum(row, len(wake) - 1)

@@ -14,8 +14,8 @@ from components.estimation.out_of_sequence import (
 )
 from components.messages.state_tracks import DELETED
 from components.tracking.association import Association, Candidates
-from components.tracking.gating import gated_pairs
-from components.tracking.management import initiated, managed, position_variance
+from components.tracking.gating import gate_pairs
+from components.tracking.management import initiate_tracks, manage_tracks, position_variance
 from components.tracking.promises import expected_looks
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import LookBatch
@@ -42,20 +42,20 @@ def step(
     part = store.take(alive)
     if len(part) < len(store):
         of = of[alive]
-    part = predicted(rules, part, batch.tick[of])
+    part = predict_tracks(rules, part, batch.tick[of])
     held = np.zeros(len(batch.detection), dtype=bool)
     if len(part):
-        part, held = associated(rules, association, part, of, batch)
+        part, held = associate_looks(rules, association, part, of, batch)
     parts.append(part)
     if not held.all():
-        new, next_number = initiated(rules, batch, ~held, next_number)
+        new, next_number = initiate_tracks(rules, batch, ~held, next_number)
         parts.append(new)
     # A single part is in the order that the store has.
-    store = parts[0] if len(parts) == 1 else TrackStore.joined(parts).in_order()
+    store = parts[0] if len(parts) == 1 else TrackStore.concatenate(parts).sort()
     return store, next_number
 
 
-def predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackStore:
+def predict_tracks(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackStore:
     """Return tracks at instants (tracks,) that are not before their own."""
     if len(part) == 0:
         return part
@@ -67,7 +67,7 @@ def predicted(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackSto
     )  # fmt: skip
 
 
-def associated(
+def associate_looks(
     rules: TrackerRules,
     association: Association,
     part: TrackStore,
@@ -76,11 +76,11 @@ def associated(
 ) -> tuple[TrackStore, BoolArray]:
     """Return predicted tracks after the looks `of` them, and which detections start no track."""
     pose = batch.pose(of)
-    kinds, direction, held = gated_pairs(rules, part, of, pose, batch)
+    kinds, direction, held = gate_pairs(rules, part, of, pose, batch)
     looked = expected_looks(rules.fields, rules.promises, part, of, batch, pose, direction)
     pairs = Candidates(rules, part, kinds, batch, pose)
     changed, hit, gain = association.update(pairs)
-    return managed(rules, part, changed, pose, looked, hit, gain), held
+    return manage_tracks(rules, part, changed, pose, looked, hit, gain), held
 
 
 def late_step(
@@ -112,40 +112,45 @@ def late_step(
     left_out = np.zeros(len(replica), dtype=bool)
     if len(now):
         ahead = now.tick > tick[of]
-        index, known = _matched(before, now, tick[of])
+        index, known = _match_earlier_tracks(before, now, tick[of])
         groups = [
             (ahead & known, before.take(index[ahead & known])),
             (ahead & ~known, None),
         ]
-        back = [
-            (one, *_retrodicted(rules, now.take(one), old, tick[of][one])) for one, old in groups
-        ]
+        back = [(one, *_retrodict(rules, now.take(one), old, tick[of][one])) for one, old in groups]
         for _, was, _, _ in back:
             position_variance(was, late=True)
-        then = [predicted(rules, now.take(~ahead), tick[of][~ahead]), *(one[1] for one in back)]
-        seen, held = associated(rules, association, _ordered(then), of, batch)
+        then = [
+            predict_tracks(rules, now.take(~ahead), tick[of][~ahead]),
+            *(one[1] for one in back),
+        ]
+        seen, held = associate_looks(rules, association, _sort_tracks(then), of, batch)
         changed = [seen.take(~ahead)]
         for one, was, states, weights in back:
-            changed.append(_carried_forward(now.take(one), was, seen.take(one), states, weights))
-        whole = _ordered(changed)
+            changed.append(_carry_forward(now.take(one), was, seen.take(one), states, weights))
+        whole = _sort_tracks(changed)
         if unless_updated:
             newer = now.updated_tick > tick[of]
             left_out[of[newer & (seen.updated_tick == tick[of])]] = True
-            whole = _ordered([whole.take(~newer), now.take(newer)])
+            whole = _sort_tracks([whole.take(~newer), now.take(newer)])
         position_variance(whole, late=True)
         parts.append(whole)
     if not held.all():
-        new, next_number = initiated(rules, batch, ~held, next_number)
+        new, next_number = initiate_tracks(rules, batch, ~held, next_number)
         parts.append(new)
-    return _ordered(parts), next_number, left_out
+    return _sort_tracks(parts), next_number, left_out
 
 
-def _ordered(parts: list[TrackStore]) -> TrackStore:
-    return TrackStore.joined(parts).sorted_by_key()
+def _sort_tracks(parts: list[TrackStore]) -> TrackStore:
+    return TrackStore.concatenate(parts).sorted_by_key()
 
 
-def _matched(before: TrackStore, now: TrackStore, tick: IntArray) -> tuple[IntArray, BoolArray]:
-    """Return where tracks stand among those of before, and which speak of `tick` at the latest."""
+def _match_earlier_tracks(
+    before: TrackStore, now: TrackStore, tick: IntArray
+) -> tuple[IntArray, BoolArray]:
+    """Return each track's index among the earlier tracks, and which have a state no later than
+    `tick`.
+    """
     if len(before) == 0:
         return np.zeros(len(now), dtype=np.int64), np.zeros(len(now), dtype=bool)
     keys, key = before.key, now.key
@@ -154,10 +159,12 @@ def _matched(before: TrackStore, now: TrackStore, tick: IntArray) -> tuple[IntAr
     return index, there & (before.tick[index] <= tick)
 
 
-def _retrodicted(
+def _retrodict(
     rules: TrackerRules, now: TrackStore, old: TrackStore | None, tick: IntArray
 ) -> tuple[TrackStore, list[Retrodiction], FloatArray]:
-    """Return the tracks at an instant that is past, what became of them since, and of models."""
+    """Return the tracks predicted back to a past instant, the retrodictions, and model
+    probabilities.
+    """
     since_s = (now.tick - tick) / rules.ticks_per_s
     present = zip(rules.estimator.models, now.states(), now.covariances(), strict=True)
     if old is None:
@@ -169,18 +176,18 @@ def _retrodicted(
             retrodiction(model, (y, q), (x, p), until_s, since_s)
             for (model, x, p), y, q in zip(present, old.states(), old.covariances(), strict=True)
         ]
-    back = rules.estimator.models_then(chances, until_s, since_s)
+    back = rules.estimator.past_model_probabilities(chances, until_s, since_s)
     weights = (back * now.weights[np.newaxis]).sum(axis=1)
     then = Estimates([one.state for one in parts], [one.covariance for one in parts], weights)
     return now.with_estimates(then, tick=tick), parts, back
 
 
-def _carried_forward(
+def _carry_forward(
     now: TrackStore, then: TrackStore, seen: TrackStore, parts: list[Retrodiction], back: FloatArray
 ) -> TrackStore:
     """Return the tracks as they are now, after a look changed what they were then."""
     moved = [
-        one.carried_over(x, p, seen_x, seen_p)
+        one.carry_forward(x, p, seen_x, seen_p)
         for one, x, p, seen_x, seen_p in zip(
             parts, now.states(), now.covariances(), seen.states(), seen.covariances(), strict=True
         )

@@ -82,7 +82,7 @@ class TrackerStub(Component):
         }
 
     def undone(self) -> dict[str, IntArray]:
-        """Return in which runs it heard of nobody but false alarms."""
+        """Return in which runs it received false alarms only."""
         return self._tries.undone("all that it gets are false alarms, and it holds nothing")
 
     def acts_every_s(self) -> Fraction | None:
@@ -96,7 +96,7 @@ class TrackerStub(Component):
 
     def run(self, wake: Wake) -> Tracks | None:
         """Take in new measurements and report what is held."""
-        fused, counts = self._measured(wake)
+        fused, counts = self._measured_entries(wake)
         if fused is None:
             return None
         updated = (counts if self.p.drop_after_s is None else counts + wake.idle).nonzero()[0]
@@ -106,7 +106,7 @@ class TrackerStub(Component):
         rows = np.repeat(np.arange(len(updated)), counts)
         replica = wake.run.take(updated)
         begins = np.concatenate(([True], replica[1:] != replica[:-1]))
-        before = self._held.of(replica[begins])
+        before = self._held.rows_of_runs(replica[begins])
         targets, column = _present(before.target, fused.target, len(fused.roster))
         pool, held, new = _pool(before, fused, replica.take(rows))
         last = np.full((len(updated), len(targets)), -1, dtype=np.int64)
@@ -127,10 +127,10 @@ class TrackerStub(Component):
         entry = last[ends][row, at]
         now = {name: values[entry] for name, values in pool.items()}
         table = KeyedTable(replica=replica[ends][row], target=targets[at], **now)
-        self._held = self._held.after(replica[begins], table, wake.first_run)
+        self._held = self._held.replace_runs(replica[begins], table, wake.first_run)
         return self._tracks(fused, wake, updated, targets, last, pool, first)
 
-    def _measured(self, wake: Wake) -> tuple[FusedDetections | None, IntArray]:
+    def _measured_entries(self, wake: Wake) -> tuple[FusedDetections | None, IntArray]:
         """Return what was measured of targets, and how many entries each row of the wake has."""
         busy = wake.without_idle()
         fused = self._nothing if busy is None else busy["fused"]
@@ -139,7 +139,7 @@ class TrackerStub(Component):
             return None, counts
         if busy is not None and len(fused.target):
             run = busy.run[fused.row_of_entries]
-            self._tries = self._tries.with_more(run, np.ones_like(run), fused.target >= 0)
+            self._tries = self._tries.add_tries(run, np.ones_like(run), fused.target >= 0)
         fused = true_entries(fused)
         if self.p.drop_after_s is not None:
             self._nothing = fused.take(slice(0, 0))

@@ -5,8 +5,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from components.estimation.batched import is_everything, selected
-from components.estimation.estimator import Estimates, combined
+from components.estimation.batched import is_everything, select_tracks
+from components.estimation.estimator import Estimates, mixture_moments
 from components.estimation.measurement import direction, range_share
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.state_tracks import COVARIANCE, DELETED, StateTracks
@@ -61,7 +61,7 @@ class TrackStore(KeyedTable):
     }
 
     @classmethod
-    def of_models(cls, sizes: Sequence[int], sensors: int) -> Self:
+    def empty_of_models(cls, sizes: Sequence[int], sensors: int) -> Self:
         """Return a store without tracks for models with states of these sizes."""
         types: dict[str, type] = {
             **cls.PLAIN,
@@ -87,13 +87,13 @@ class TrackStore(KeyedTable):
         """Return all tracks by run and number, as searches in them want them."""
         return self.take(np.lexsort((self.number, self.replica)))
 
-    def with_ended(self, before: Self) -> Self:
+    def append_deleted(self, before: Self) -> Self:
         """Return the tracks, and those of some before that are there no more, as deleted."""
         gone = before.take(~np.isin(before.key, self.key))
         if len(gone) == 0:
             return self
         ended = gone.with_columns(status=np.full(len(gone), DELETED))
-        return self.joined([self, ended]).sorted_by_key()
+        return self.concatenate([self, ended]).sorted_by_key()
 
     def estimates(self) -> Estimates:
         """Return what the filter knows of the tracks."""
@@ -103,7 +103,7 @@ class TrackStore(KeyedTable):
         """Return the same tracks with other estimates, and other values in some columns."""
         return self.with_columns(**estimate_columns(estimates), **columns)
 
-    def put(self, which: IntArray, new: dict[str, Any]) -> Self:
+    def replace_columns(self, which: IntArray, new: dict[str, Any]) -> Self:
         """Return tracks with other values in some columns of some of them."""
         if is_everything(which, len(self)):
             return self.with_columns(**new)
@@ -156,7 +156,7 @@ _MODELS = {
 }  # fmt: skip
 
 
-def tracks_after(store: TrackStore, records: KeyedTable, rows: IntArray) -> TrackStore:
+def tracks_to_report(store: TrackStore, records: KeyedTable, rows: IntArray) -> TrackStore:
     """Return the tracks of some replicas as they are to be reported.
 
     ``row`` is the row of the wake of each replica's report, as given; ``own`` and ``origin`` are
@@ -166,7 +166,9 @@ def tracks_after(store: TrackStore, records: KeyedTable, rows: IntArray) -> Trac
     mine = records.replica[index] == store.replica
     index = index[mine]
     return store.take(mine).with_columns(
-        row=rows[index], own=selected(records.own, index), origin=selected(records.origin, index)
+        row=rows[index],
+        own=select_tracks(records.own, index),
+        origin=select_tracks(records.origin, index),
     )
 
 
@@ -182,7 +184,7 @@ def _by_row(reported: Sequence[TrackStore]) -> TrackStore:
     parts = [part.columns for part in reported]
     row = np.concatenate([part["row"] for part in parts])
     if not bool((row[1:] < row[:-1]).any()):
-        return TrackStore.joined(reported)
+        return TrackStore.concatenate(reported)
     order = np.argsort(row, kind="stable")
     columns = {}
     for name in parts[0].keys() - _UNSHOWN:
@@ -210,7 +212,7 @@ def state_tracks(
         empty.sensors = sensors
         return empty
     tracks = _by_row(reported)
-    state, covariance = combined(tracks.estimates())
+    state, covariance = mixture_moments(tracks.estimates())
     own, origin = tracks.own, tracks.origin
     away = state[:3] - own
     seen = direction(away, covariance)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.estimation.batched import selected
+from components.estimation.batched import select_tracks
 from components.estimation.estimator import Estimator, ExtendedKalmanFilter
 from components.estimation.frame import pose_in_frame
 from components.estimation.motion import ConstantVelocity
@@ -21,8 +21,8 @@ from components.tracking.out_of_sequence import (
     Past,
     Plan,
     Snapshot,
+    late_look_shares,
     latest_s,
-    left_out,
     may_come_late,
     plan_of_late,
     straight_plan,
@@ -32,14 +32,14 @@ from components.tracking.out_of_sequence import (
 from components.tracking.promises import ACTS_EVERY_S, Silence
 from components.tracking.reported_errors import (
     coarse_bearings,
+    errors_by_sensors,
     folded_ranges,
-    reported_errors,
     unknown_latency,
 )
-from components.tracking.rules import TrackerParameters, TrackerRules, why_no_range_rates
-from components.tracking.scans import LookBatch, Scans, scans_of, when_made
+from components.tracking.rules import TrackerParameters, TrackerRules, range_rate_refusal
+from components.tracking.scans import LookBatch, Scans, scans_of, split_due_looks
 from components.tracking.step import late_step, step
-from components.tracking.track_store import TrackStore, records_of, state_tracks, tracks_after
+from components.tracking.track_store import TrackStore, records_of, state_tracks, tracks_to_report
 from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, Output
@@ -112,10 +112,10 @@ class Tracker(Component):
         self.rules: TrackerRules | None = None
         self._association = self.association()
         self._estimator = self.estimator()
-        if errors := reported_errors(offers):
+        if errors := errors_by_sensors(offers):
             self._estimator = self._estimator.carrying(tuple(one.lasts_s for one, _ in errors))
         self._sensors: tuple[str, ...] = ()
-        self._store = self._no_tracks(0)
+        self._store = self._empty_store(0)
         self._records = records_of(np.empty(0, dtype=np.int64), np.empty((3, 0)))
         self._past: Past | None = None
         self._ahead: Scans | None = None
@@ -160,7 +160,7 @@ class Tracker(Component):
         if self.p.late == "drop":
             lag_s, why = Fraction(0), "late is 'drop'"
         offers = sensor_offers(self.context.producers)
-        shares = left_out(offers, lag_s, self.context.duration_s)
+        shares = late_look_shares(offers, lag_s, self.context.duration_s)
         result = [warning(n, share, why) for n, share in shares.items()]
         for name, offer in sorted(offers.items()):
             if not isinstance(offer, SensorOffer) or offer.lasting is None:
@@ -197,22 +197,22 @@ class Tracker(Component):
             for name, offer in sorted(offers.items())
             if isinstance(offer, SensorOffer)
             and offer.measures_range_rate
-            and (why := why_no_range_rates(self.p, offer))
+            and (why := range_rate_refusal(self.p, offer))
         ]
 
-    def _no_tracks(self, sensors: int) -> TrackStore:
-        return TrackStore.of_models([model.size for model in self._estimator.models], sensors)
+    def _empty_store(self, sensors: int) -> TrackStore:
+        return TrackStore.empty_of_models([model.size for model in self._estimator.models], sensors)
 
     def run(self, wake: Wake) -> StateTracks | None:
         """Take in what came, look by look, end what fell silent, and report all tracks."""
         busy = wake.without_idle()
         reported, worked = list[TrackStore](), _NO_ROWS
         if busy is not None:
-            reported, worked = self._looked(busy, wake)
+            reported, worked = self._process_looks(busy, wake)
         silence = self._silence(wake, worked)
         if len(self._store) and len(silence):
-            spans = silence.after(self._records.replica, self._records.worked_tick)
-            self._store, more = silence.ended(self._store, self._records, *spans)
+            spans = silence.from_last_work(self._records.replica, self._records.worked_tick)
+            self._store, more = silence.end_silent_tracks(self._store, self._records, *spans)
             reported += more
         rows = np.unique(np.concatenate([worked, *(part.row[:1] for part in reported)]))
         if len(rows) == 0:
@@ -225,7 +225,7 @@ class Tracker(Component):
         rows = np.delete(np.arange(len(wake)), worked)
         return Silence(wake.instants, rows, self._late_ticks, self.context.ticks_per_s)
 
-    def _looked(self, busy: Wake, wake: Wake) -> tuple[list[TrackStore], IntArray]:
+    def _process_looks(self, busy: Wake, wake: Wake) -> tuple[list[TrackStore], IntArray]:
         """Work on the looks that came; return what is reported, and the rows that brought work.
 
         `busy` are the rows of the wake at which something came.
@@ -236,19 +236,19 @@ class Tracker(Component):
         if self.rules is None or fused.sensors != self._sensors:
             self._sensors = fused.sensors
             self.rules = self._rules_for(fused.sensors)
-            self._store = self._no_tracks(len(fused.sensors))
+            self._store = self._empty_store(len(fused.sensors))
         came = scans_of(fused)
         self._early += int((came.tick > busy.ticks[came.row]).sum())
-        scans, self._ahead = when_made(came, self._ahead, busy)
+        scans, self._ahead = split_due_looks(came, self._ahead, busy)
         if len(scans) == 0:
             return [], _NO_ROWS
-        records = self._records.continued(records_of(scans.run, scans.pose[:3]))
+        records = self._records.latest_or_new(records_of(scans.run, scans.pose[:3]))
         store = self._store.take(self._store.replica >= wake.first_run)
         begin, before, waiting = 0, dict[int, Snapshot](), None
         if self._past is not None:
-            past, waiting = self._past.split(records.replica, wake.first_run)
+            past, waiting = self._past.split_runs(records.replica, wake.first_run)
             begin, before = len(past), dict(enumerate(past.before))
-            scans = Scans.joined([past.scans, scans])
+            scans = Scans.concatenate([past.scans, scans])
         of = np.searchsorted(records.replica, scans.run)
         kept: list[int] = []
         if not self._remembers:
@@ -257,12 +257,12 @@ class Tracker(Component):
             plan, left_out, kept = plan_of_late(
                 scans, of, begin, self._lag_ticks, rerun=self.p.late == "rerun"
             )
-        self._count = self._count.of(fused.sensors, scans, slice(begin, None), left_out)
+        self._count = self._count.with_looks(fused.sensors, scans, slice(begin, None), left_out)
         moves = scans.velocity if self.rules.rates_of else None
-        origin = selected(records.origin, of)
+        origin = select_tracks(records.origin, of)
         poses = pose_in_frame(origin, scans.pose[:3], scans.pose[3:], moves)
         codes = scans.kinds(self.rules.rates_of, self.rules.carried is not None)
-        turned = scans.in_frame(origin)
+        turned = scans.rotate_to_frame(origin)
         reported: list[TrackStore] = []
         reports = plan.reports
         # The row of the wake that each work is of.
@@ -270,19 +270,19 @@ class Tracker(Component):
         rows = np.unique(row)
         silence, first, last = self._silence(wake, rows), row, row - 1
         if len(silence):
-            first, last = silence.before(row, records.worked_tick[plan.of])
+            first, last = silence.since_last_work(row, records.worked_tick[plan.of])
         records.worked_tick[plan.of] = wake.ticks[row]
         # Tracks as last shown, of runs in a row that brings several works: one may end in between.
         shown_last, begins = store.take(_NO_ROWS), plan.begins
         for works in turns(plan.of):
             if len(store) and bool((first[works] <= last[works]).any()):
                 asked = records.take(plan.of[works])
-                store, more = silence.ended(store, asked, first[works], last[works])
+                store, more = silence.end_silent_tracks(store, asked, first[works], last[works])
                 reported += more
             if len(store) and len(some := works[begins[works]]):
                 alive = store.status != DELETED
                 alive &= np.isin(store.replica, records.replica[plan.of[some]])
-                shown_last = TrackStore.joined([shown_last, store.take(alive)])
+                shown_last = TrackStore.concatenate([shown_last, store.take(alive)])
             late, works_now = works[plan.since[works] >= 0], works[plan.since[works] < 0]
             if len(late):
                 of_late = plan.of[late]
@@ -290,18 +290,18 @@ class Tracker(Component):
                 old = tracks_before(before, plan.since[late].tolist(), replicas.tolist())
                 store, records.next_number[of_late], gone = late_step(
                     self.rules, self._association, store, old,
-                    LookBatch.of_looks(turned, plan.look[late], replicas, codes, poses),
+                    LookBatch.from_looks(turned, plan.look[late], replicas, codes, poses),
                     records.next_number[of_late], unless_updated=self.p.late == "drop",
                 )  # fmt: skip
                 too_late = plan.look[late[gone]]
-                self._count = self._count.of(fused.sensors, scans, slice(0), too_late)
+                self._count = self._count.with_looks(fused.sensors, scans, slice(0), too_late)
             looks, mine = plan.look[works_now], plan.of[works_now]
             if self._remembers:
                 store = self._remember(store, records, plan, works_now, before)
             if len(looks):
                 store, records.next_number[mine] = step(
                     self.rules, self._association, store,
-                    LookBatch.of_looks(turned, looks, records.replica[mine], codes, poses),
+                    LookBatch.from_looks(turned, looks, records.replica[mine], codes, poses),
                     records.next_number[mine],
                 )  # fmt: skip
                 records.tick[mine] = scans.tick[looks]
@@ -311,26 +311,26 @@ class Tracker(Component):
             told = store
             if len(shown_last) and len(shown):
                 of_shown = np.isin(shown_last.replica, records.replica[plan.of[shown]])
-                told = store.with_ended(shown_last.take(of_shown))
+                told = store.append_deleted(shown_last.take(of_shown))
                 shown_last = shown_last.take(~of_shown)
             if len(told) and len(shown):
-                reported.append(tracks_after(told, records.take(plan.of[shown]), row[shown]))
-        self._records = self._records.after(records.replica, records, wake.first_run)
+                reported.append(tracks_to_report(told, records.take(plan.of[shown]), row[shown]))
+        self._records = self._records.replace_runs(records.replica, records, wake.first_run)
         self._store = store
         if self._remembers:
-            self._past = Past.of(scans, kept, before, waiting)
+            self._past = Past.from_looks(scans, kept, before, waiting)
         self._note(came, reported)
         return reported, rows
 
     def _note(self, came: Scans, reported: list[TrackStore]) -> None:
         """Note in which runs something was detected, and a track confirmed."""
         detected = came.run[np.diff(came.offsets) > 0]
-        self._tries = self._tries.with_more(
+        self._tries = self._tries.add_tries(
             detected, np.ones_like(detected), np.zeros(len(detected), dtype=bool)
         )
         for part in reported:
             sure = part.replica[part.status == CONFIRMED]
-            self._tries = self._tries.with_more(
+            self._tries = self._tries.add_tries(
                 sure, np.ones_like(sure), np.ones(len(sure), dtype=bool)
             )
 
@@ -349,7 +349,7 @@ class Tracker(Component):
             replicas = records.replica[of]
             others = store.take(~np.isin(store.replica, replicas))
             old = tracks_before(before, back, replicas.tolist())
-            store = TrackStore.joined([others, old]).in_order()
+            store = TrackStore.concatenate([others, old]).sort()
             records.next_number[of] = [before[look].next_number for look in back]
         for work in works.tolist():
             number = int(records.next_number[plan.of[work]])

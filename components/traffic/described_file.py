@@ -10,7 +10,7 @@ from components.formats.text_rows import TrafficFile, TrafficFileError
 from components.traffic.files import FileTrafficParameters, traffic_of
 from dsa_des.errors import UsageError
 from dsa_des.scene.data_files import DataScene
-from dsa_des.text.safe_text import shell_line, shortened
+from dsa_des.text.safe_text import shell_line, shorten
 
 _MOST_NAMES = 6
 
@@ -32,16 +32,16 @@ def scene_of_recording(path: Path) -> DataScene:
         "title": f"{path.name}, {content.kind}",
         "blocks": {"traffic": traffic},
     }
-    return DataScene(tables, described(path, content))
+    return DataScene(tables, describe_file(path, content))
 
 
-def described(path: Path, content: TrafficFile) -> list[str]:
+def describe_file(path: Path, content: TrafficFile) -> list[str]:
     """Return what a file holds, in lines: what it is, who, when, where, and what to type."""
     aircraft = content.aircraft
     first = min(float(craft.sample_times_s[0]) for craft in aircraft)
     last = max(float(craft.sample_times_s[-1]) for craft in aircraft)
     count = sum(len(craft.sample_times_s) for craft in aircraft)
-    names = ", ".join(shortened(craft.name, 24) for craft in aircraft[:_MOST_NAMES])
+    names = ", ".join(shorten(craft.name, 24) for craft in aircraft[:_MOST_NAMES])
     more = f", and {len(aircraft) - _MOST_NAMES} more" if len(aircraft) > _MOST_NAMES else ""
     edges = [
         f"{min(map(np.min, values)):.5g} to {max(map(np.max, values)):.5g}"
@@ -60,7 +60,7 @@ def described(path: Path, content: TrafficFile) -> list[str]:
     if away:
         lines.append(f"  gaps      {away} in which an aircraft is not there")
     lines += [
-        f"  ownship   {shortened(content.ownship.name, 24)}, the first; "
+        f"  ownship   {shorten(content.ownship.name, 24)}, the first; "
         "--set blocks.traffic.ownship=NAME takes another",
         "To fly it before the sensors of detect_and_sense:",
         f"  dsa-des run {word}" + (" --duration 600" if last - first > 1200.0 else ""),

@@ -37,7 +37,7 @@ class Box(Parameters):
     )  # fmt: skip
 
     @model_validator(mode="after")
-    def _holds_something(self) -> Self:
+    def _check_not_empty(self) -> Self:
         if self.north_deg <= self.south_deg:
             raise ValueError(
                 f"north_deg is {self.north_deg:g}: it must be above south_deg, {self.south_deg:g}"
@@ -127,7 +127,7 @@ class FileTrafficParameters(RecordedTrafficParameters, FileHeights):
     )
 
     @model_validator(mode="after")
-    def _one_ownship(self) -> Self:
+    def _check_one_ownship(self) -> Self:
         if self.own_flight is not None:
             for key in ("own_file", "ownship", "own_starts_s"):
                 if getattr(self, key) is not None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from components.aircraft.aircraft import Roster
 from components.flights.culling import NearIntervals
-from components.flights.fleet import Fleet, in_rows
+from components.flights.fleet import Fleet, assemble_rows
 from components.flights.many_flights import SteeredFleet
 from components.geometry import TrajectoryState
 from components.messages.steering import Manoeuvre
@@ -90,7 +90,7 @@ class WithOthers(Fleet):
             states.append(others.each(run[mine], time_s[mine]))
         rows.append(np.flatnonzero(left))
         states.append(self._targets.each(aircraft[left], time_s[left]))
-        return in_rows(rows, states)
+        return assemble_rows(rows, states)
 
 
 class FlightsOfRuns(NamedTuple):
@@ -158,7 +158,7 @@ class FlownFlights:
         }
 
     def seen_from(self, viewer: int) -> tuple[Fleet, Fleet]:
-        """Return the flights of who looks, and of its targets, without any manoeuvre."""
+        """Return the viewing platform's flight and its targets' flights, without manoeuvres."""
         own = self.platforms[viewer].nominal
         if viewer < 0:
             return own, self.targets
@@ -166,8 +166,8 @@ class FlownFlights:
 
     def as_flown(self) -> Fleet:
         """Return the flights of the targets with all manoeuvres."""
-        steered = self.steered_targets
-        return WithOthers(self.targets, self.width, steered) if steered else self.targets
+        steer = self.steered_targets
+        return WithOthers(self.targets, self.width, steer) if steer else self.targets
 
     def platform_at(
         self,
@@ -209,7 +209,7 @@ class FlownFlights:
                 counts = None if known is None else known[mine, place]
                 rows.append(mine)
                 states.append(self.platform_at(index, run[mine], time_s[mine], counts))
-        return in_rows(rows, states)
+        return assemble_rows(rows, states)
 
     def _as_scripted(
         self, target: IntArray, time_s: FloatArray, state: TrajectoryState | None
@@ -272,7 +272,7 @@ class FlownFlights:
         if viewer in self.intervals:
             near = self.intervals[viewer].holds(target, times, times)
             others = replace(others, present=others.present & near)
-        return looking, others.reshaped(shape)
+        return looking, others.reshape(shape)
 
     def own_states(
         self, run: IntArray, known: IntArray, time_s: FloatArray, viewer: int
@@ -286,7 +286,7 @@ class FlownFlights:
         mine = known[..., list(self.platforms).index(viewer)]
         runs, counts = (np.broadcast_to(of, time_s.shape).reshape(-1) for of in (run, mine))
         state = self.platform_at(viewer, runs, time_s.reshape(-1), counts)
-        return state.reshaped(time_s.shape)
+        return state.reshape(time_s.shape)
 
     def _published_s(self, run: IntArray, time_s: FloatArray) -> FloatArray:
         """Return the times of the last publications."""
@@ -340,7 +340,7 @@ def due_manoeuvres(wake: Wake, pending: Coming) -> tuple[Coming, Coming]:
     return pending.take(due), pending.take(~due)
 
 
-def steered(
+def steer(
     own: SteeredFleet, due: Coming, wake: Wake, run: IntArray
 ) -> tuple[SteeredFleet, IntArray]:
     """Return a platform that flies what has come, and how many manoeuvres each row of runs knows.
@@ -350,12 +350,12 @@ def steered(
     known: IntArray = own.manoeuvre_count[run]
     for one in turns(due.replica):  # the first of every run, then the next
         ownship, ticks = due.replica[one], due.tick[one]
-        own = own.steered(ownship, ticks / wake.ticks_per_s, due.manoeuvre[:, one].T)
-        known = known + _at_or_after(run, wake.ticks, ownship, ticks)
+        own = own.add_manoeuvres(ownship, ticks / wake.ticks_per_s, due.manoeuvre[:, one].T)
+        known = known + _is_at_or_after(run, wake.ticks, ownship, ticks)
     return own, known
 
 
-def _at_or_after(run: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray) -> IntArray:
+def _is_at_or_after(run: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray) -> IntArray:
     """Return 1 for the rows of some ownships at or after what came for each of them."""
     order = np.argsort(ownship)
     index = np.minimum(np.searchsorted(ownship[order], run), len(ownship) - 1)

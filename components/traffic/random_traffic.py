@@ -46,7 +46,7 @@ class RandomTrafficParameters(SourceParameters):
     )
 
     @model_validator(mode="after")
-    def _ordered(self) -> Self:
+    def _check_order(self) -> Self:
         if self.speed_max_mps < self.speed_min_mps:
             raise ValueError(
                 f"speed_max_mps is {self.speed_max_mps:g}: it must be at least speed_min_mps, "
@@ -92,7 +92,7 @@ class RandomTraffic(TrafficSource):
         aircraft = [p.aircraft] * len(names)
         if p.equipage_shares != EquipageShares():
             aircraft = with_shares(names, aircraft, p.equipage_shares, self.stream("equipage"))
-        self.roster = Roster.of(list(zip(names, aircraft, strict=True)), (own.name, own))
+        self.roster = Roster.from_pairs(list(zip(names, aircraft, strict=True)), (own.name, own))
 
     def sample_times(self) -> list[SampleTimes]:
         """Return a regular grid over the run."""

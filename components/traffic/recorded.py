@@ -42,17 +42,17 @@ def suspicions(aircraft: Sequence[SampledTrajectory]) -> list[str]:
     """Return what is suspicious about the flights of a file, one sentence for each kind."""
     by_hint: dict[str, list[str]] = {}
     for craft in aircraft:
-        for what, hint in _of_one(craft):
+        for what, hint in _describe_aircraft(craft):
             by_hint.setdefault(hint, []).append(f"{craft.name}: {what}")
-    return [f"{_few(cases)}; {hint}" for hint, cases in by_hint.items()]
+    return [f"{_list_few(cases)}; {hint}" for hint, cases in by_hint.items()]
 
 
-def _few(cases: Sequence[str]) -> str:
+def _list_few(cases: Sequence[str]) -> str:
     more = f" (and {len(cases) - 1} more aircraft)" if len(cases) > 1 else ""
     return cases[0] + more
 
 
-def _of_one(craft: SampledTrajectory) -> list[tuple[str, str]]:
+def _describe_aircraft(craft: SampledTrajectory) -> list[tuple[str, str]]:
     """Return (what an aircraft does, what it looks like)."""
     oddities: list[tuple[str, str]] = []
     highest = float(np.max(craft.alt_m))
@@ -201,7 +201,7 @@ class RecordedTraffic(TrafficSource):
             names, stream = self.roster.names, self.stream("equipage")
             shared = with_shares(names, self.roster.aircraft, parameters.equipage_shares, stream)
             own = self.roster.own_name, self.roster.own_aircraft[0]
-            self.roster = Roster.of(list(zip(names, shared, strict=True)), own)
+            self.roster = Roster.from_pairs(list(zip(names, shared, strict=True)), own)
 
     def _let_ownship_be(self, own: Ownship | None) -> None:
         """Take what a scene says of its ownship, where it says it."""
@@ -283,7 +283,7 @@ class RecordedTraffic(TrafficSource):
         return [f"file {self.file_names()}: {line}" for line in lines]
 
     def report(self) -> dict[str, Any]:
-        """Return closest approaches, and what the file's own clock said at time 0."""
+        """Return closest approaches, and the file's own clock at time 0."""
         source: dict[str, Any] = {
             "start_time_s": self.content.start_time_s,
             "notes": self.content.notes,
@@ -304,4 +304,4 @@ def roster_of(
     targets = [(name, others.get(name, default)) for name in names]
     # An address said for intruders is theirs alone.
     own_craft = others.get(own, default.model_copy(update={"icao_address": None}))
-    return Roster.of(targets, (OWNSHIP, own_craft))
+    return Roster.from_pairs(targets, (OWNSHIP, own_craft))

@@ -52,7 +52,7 @@ class Flight(Parameters):
     legs: list[AnyLeg] = Field(default=[], description="What it does, one after the other.")
 
     @model_validator(mode="after")
-    def _one_speed(self) -> Self:
+    def _check_one_speed(self) -> Self:
         if self.airspeed_mps is not None and self.legs:
             raise ValueError(
                 f"airspeed_mps is {self.airspeed_mps:g} and there are legs: their speeds are over "
@@ -109,7 +109,7 @@ class Site(Parameters):
     pitch_deg: float = Field(default=0.0, ge=-90, le=90, description="How far that is up, deg.")
     roll_deg: float = Field(default=0.0, ge=-360, le=360, description="Turn about that axis, deg.")
 
-    def at_rest(self, own: Position, terrain: Any) -> "Intruder":
+    def to_intruder(self, own: Position, terrain: Any) -> "Intruder":
         """Return it as an aircraft that stands; offsets count from the ownship's start."""
         place, offset = (self.lat_deg, self.lon_deg), (self.east_m, self.north_m)
         given, other = (offset, place) if place == (None, None) else (place, offset)
@@ -174,7 +174,7 @@ class ScriptedParameters(SourceParameters):
     def targets(self, terrain: Any) -> list[Intruder]:
         """Return all that is there: intruders, the pieces of wires, and sites, which stand."""
         pieces = [Intruder(**piece) for wire in self.wires for piece in wire.pieces()]
-        sites = [site.at_rest(self.ownship.start, terrain) for site in self.sites]
+        sites = [site.to_intruder(self.ownship.start, terrain) for site in self.sites]
         return self.intruders + pieces + sites
 
 
@@ -198,7 +198,7 @@ class ScriptedTraffic(TrafficSource):
                 raise ValueError(f"{key}: the name {craft.name!r} is used more than once")
             used.add(craft.name)
         self.targets = _intruders(crafts, own.start, self.wind)
-        self.roster = Roster.of([(craft.name, craft) for craft in crafts], (own.name, own))
+        self.roster = Roster.from_pairs([(craft.name, craft) for craft in crafts], (own.name, own))
 
     def flights_of_runs(
         self, parameters: Sequence[Any], make: Callable[[int], Any]

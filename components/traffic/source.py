@@ -42,12 +42,12 @@ from components.traffic.flown_flights import (
     WithOthers,
     arrived_manoeuvres,
     due_manoeuvres,
-    steered,
+    steer,
 )
 from components.traffic.recorded_truth import truth_is_recorded
 from components.traffic.views import Seen, View
 from components.traffic.wind_effect import ATTITUDE
-from dsa_des.arrays.run_ticks import no_runs
+from dsa_des.arrays.run_ticks import runs_of_single
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
@@ -216,7 +216,7 @@ class TrafficSource(Component):
         #: The targets that were moved last, and their fleet.
         self._moved: tuple[IntArray, Fleet] = np.arange(len(roster)), flights.targets
         culls = not self.context.simulate_everything and self.clock_of(self.p) is None
-        steered = sorted(self._steers.values()) if self.context.producers else None
+        steer = sorted(self._steers.values()) if self.context.producers else None
         duration_s = float(self.context.duration_s)
         #: What each platform may look at, the ownship's first.
         self._views = [
@@ -225,7 +225,7 @@ class TrafficSource(Component):
                 viewer,
                 look if culls else replace(look, range_m=math.inf),
                 duration_s + look.lasts_s,
-                steered,
+                steer,
             )
             for viewer, look in self._looks.items()
         ]
@@ -254,7 +254,7 @@ class TrafficSource(Component):
     ) -> "TrafficSource | None":
         """Return what flies the flights of all runs."""
         # Where the line of sight was chosen by where the traffic is, each replica chooses.
-        if self._offered is not None and self._offered.asked:
+        if self._offered is not None and self._offered.was_asked:
             return None
         self.prepare(parameters)
         flights = self.flights_of_runs(parameters, make)
@@ -299,7 +299,7 @@ class TrafficSource(Component):
     def run(self, wake: Wake) -> Message | None:
         """Return the state of all aircraft that may matter, at every instant."""
         # Flights that all runs share are those of one.
-        run = wake.run if len(self._flown.own) > 1 else no_runs(len(wake))
+        run = wake.run if len(self._flown.own) > 1 else runs_of_single(len(wake))
         time_s = wake.time_s
         known = self._steer(wake, run)
         flown = self._flown
@@ -326,7 +326,7 @@ class TrafficSource(Component):
 
     def _steer(self, wake: Wake, run: IntArray) -> IntArray:
         """Let platforms fly what has come; return how many manoeuvres of each every row knows."""
-        self._pending = Coming.joined([self._pending, *arrived_manoeuvres(wake, self._steers)])
+        self._pending = Coming.concatenate([self._pending, *arrived_manoeuvres(wake, self._steers)])
         if not len(self._pending):
             counts = [fleet.manoeuvre_count[run] for fleet in self._flown.platforms.values()]
             return np.array(counts).T
@@ -338,7 +338,7 @@ class TrafficSource(Component):
                 from_s, until_s = fleet.nominal.intervals_present_s[mine.replica].T
                 time_s = mine.tick / wake.ticks_per_s
                 mine = mine.take((from_s <= time_s) & (time_s <= until_s))
-            platforms[platform], count = steered(fleet, mine, wake, run)
+            platforms[platform], count = steer(fleet, mine, wake, run)
             known.append(count)
             for view in self._views:
                 if view.viewer == platform and view.epochs is not None:
@@ -360,9 +360,9 @@ class TrafficSource(Component):
             state = self._moved[1].at(time_s)
             if not flown.crabbing and not flown.steered_targets:
                 return state
-            state = state.reshaped((-1,))
+            state = state.reshape((-1,))
         each = (run[:, np.newaxis] * flown.width + columns).reshape(-1)
-        return flown.targets_at(each, np.repeat(time_s, len(columns)), state).reshaped(shape)
+        return flown.targets_at(each, np.repeat(time_s, len(columns)), state).reshape(shape)
 
     def own_at(self, time_s: FloatArray) -> TrajectoryState:
         """Return the ownship's state, as it is known now, at times (n,), in wind."""

@@ -63,7 +63,7 @@ class View:
             "farther"
         )
 
-    def near(
+    def near_targets(
         self, flown: FlownFlights, run: IntArray, time_s: FloatArray
     ) -> tuple[TrajectoryState | None, IntArray, BoolArray | None]:
         """Return the state of the ownship, if it looks, at each row, which targets may come in the
@@ -71,7 +71,7 @@ class View:
         """
         every, lasts_s, one_run = np.arange(self._width), self.look.lasts_s, len(flown.own) == 1
         if self.epochs is not None:
-            state, near = self.epochs.near(flown.platforms[self.viewer], run, time_s)
+            state, near = self.epochs.states_and_near(flown.platforms[self.viewer], run, time_s)
             near[:, self._steered] = True
             columns = np.flatnonzero(near.any(axis=0)) if one_run else every
             return self._own(flown, run, time_s, state), columns, near[:, columns]
@@ -79,8 +79,10 @@ class View:
         if self.intervals is None:
             return own, every, None
         if one_run:
-            columns = self.intervals.during(float(time_s.min()), float(time_s.max()) + lasts_s)
-            return own, columns, self.intervals.near(columns, time_s, lasts_s)
+            columns = self.intervals.targets_near(
+                float(time_s.min()), float(time_s.max()) + lasts_s
+            )
+            return own, columns, self.intervals.may_be_near(columns, time_s, lasts_s)
         each = (run[:, np.newaxis] * flown.width + every).reshape(-1)
         times = np.repeat(time_s, len(every))
         near = self.intervals.holds(each, times, times + lasts_s)
@@ -104,7 +106,7 @@ class Seen:
         self, views: Sequence[View], flown: FlownFlights, run: IntArray, time_s: FloatArray
     ) -> None:
         self._width, self._views, self._unseen = flown.width, views, flown.unseen
-        self._near = {view.viewer: view.near(flown, run, time_s) for view in views}
+        self._near = {view.viewer: view.near_targets(flown, run, time_s) for view in views}
         own, columns, _ = self._near[-1]
         assert own is not None
         #: The state of the ownship at each row, and which targets are to be moved.
@@ -116,7 +118,7 @@ class Seen:
             self.columns = np.unique(np.concatenate([columns, viewers, *others]))
 
     def by_ownship(self, there: BoolArray) -> tuple[BoolArray, IntArray | None]:
-        """Return who is there for the ownship, of who is there, and how many are left out."""
+        """Return which targets are present for the ownship, and how many are left out."""
         return self._present(-1, there, self.own.present)
 
     def by_others(

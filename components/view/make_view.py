@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from components.display.recorded_run import or_a_scene
-from components.view.page import RunPicture, page_text, pages_beside
+from components.display.recorded_run import suggest_scene
+from components.view.page import RunPicture, page_of_several, page_text
 from components.view.run_picture import encounter_picture, run_picture
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import check_file, write_file
-from dsa_des.files.output_names import named
+from dsa_des.files.output_names import user_path
 from dsa_des.terminal.terminal import say
 
 #: More would be too narrow to be read.
@@ -28,8 +28,8 @@ def make_view(runs: tuple[str, ...], out: str | None, platform: str | None) -> N
             name = Path(run).resolve().name
             if picture.title != name:
                 picture.title = f"{name}: {picture.title}"
-        page = pages_beside(pictures)
-    target = _beside(runs) if out is None else named(out)
+        page = page_of_several(pictures)
+    target = _default_page_path(runs) if out is None else user_path(out)
     check_file(target)
     try:
         write_file(target, page.encode("utf-8"))
@@ -38,7 +38,7 @@ def make_view(runs: tuple[str, ...], out: str | None, platform: str | None) -> N
     say(f"wrote {target}")
 
 
-def _beside(runs: tuple[str, ...]) -> Path:
+def _default_page_path(runs: tuple[str, ...]) -> Path:
     """Return where the page goes by itself: beside the first run, with the names of all."""
     paths = [Path(run) if Path(run).is_file() else Path(run).resolve() for run in runs]
     names = [path.stem if path.is_file() else path.name for path in paths]
@@ -61,4 +61,4 @@ def _picture(source: Path, platform: str | None) -> RunPicture:
         return encounter_picture(source)
     if source.exists():
         raise UsageError(f"{source}: is neither a run's folder nor a .daa file")
-    raise UsageError(f"{source}: there is no such folder or file{or_a_scene(str(source))}")
+    raise UsageError(f"{source}: there is no such folder or file{suggest_scene(str(source))}")

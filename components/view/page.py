@@ -45,13 +45,13 @@ class RunPicture:
     trackers: list[str] = field(default_factory=list)
     tables: dict[str, dict[str, AnyArray]] = field(default_factory=dict)
 
-    def packed(self) -> dict[str, Any]:
+    def to_json_tables(self) -> dict[str, Any]:
         """Return it for JSON; columns are little-endian numbers in base 64."""
-        tables = {name: _packed(table) for name, table in self.tables.items()}
+        tables = {name: _pack(table) for name, table in self.tables.items()}
         return {**vars(self), "tables": tables}
 
 
-def _packed(table: Mapping[str, AnyArray]) -> dict[str, Any]:
+def _pack(table: Mapping[str, AnyArray]) -> dict[str, Any]:
     return {name: _column(name, values) for name, values in table.items()}
 
 
@@ -77,13 +77,13 @@ def page_text(picture: RunPicture) -> str:
         "policy": _policy(digest),
         "title": escape(printable(picture.title)),
         "style": page_part(_PACKAGE, "style.css"),
-        "data": _json(picture.packed()),
+        "data": _json(picture.to_json_tables()),
         "script": script,
     }
-    return page_filled(_PACKAGE, "view.html", contents)
+    return fill_page(_PACKAGE, "view.html", contents)
 
 
-def pages_beside(pictures: Sequence[RunPicture]) -> str:
+def page_of_several(pictures: Sequence[RunPicture]) -> str:
     """Return one page with those of several pictures beside each other, on one clock.
 
     Each stands in a frame of its own, as text of this page: nothing is fetched for it either.
@@ -101,7 +101,7 @@ def pages_beside(pictures: Sequence[RunPicture]) -> str:
         "frames": "\n".join(frames),
         "script": script,
     }
-    return page_filled(_PACKAGE, "beside.html", contents)
+    return fill_page(_PACKAGE, "beside.html", contents)
 
 
 def _policy(*digests: str) -> str:
@@ -140,7 +140,7 @@ def _digest(script: str) -> str:
     return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
-def page_filled(package: str, name: str, contents: Mapping[str, str]) -> str:
+def fill_page(package: str, name: str, contents: Mapping[str, str]) -> str:
     """Return a page with contents in the places of its ``{{marks}}``.
 
     In one pass: what is put in may hold such marks itself.

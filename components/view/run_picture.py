@@ -76,7 +76,7 @@ def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
         return result | _sources(run, table)
 
     tables = picture.tables
-    tables["own"] = _own_columns(own_s, own, plane)
+    tables["own"] = _ownship_columns(own_s, own, plane)
     if "truth" in run.tables:
         tables["truth"] = _truth(run, plane, targets)
     tables["scans"] = {
@@ -89,7 +89,7 @@ def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
         "sensor": _codes(run.texts("detections", "block"), sensors),
         "target": _codes(run.texts("detections", "target"), targets),
         "scan": run.values("detections", "scan"),
-        **_seen(run, "detections", run.stacked("detections", POSE), plane),
+        **_lines_of_sight(run, "detections", run.stack_columns("detections", POSE), plane),
     }
     for name in ("fused", "tracks"):
         if run.has(name, "azimuth_rad"):
@@ -98,7 +98,7 @@ def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
                 **about(name),
                 **plain(name, "age_s"),
                 "time_s": time_s,
-                **_seen(run, name, poses.at(name, time_s), plane),
+                **_lines_of_sight(run, name, poses.at(name, time_s), plane),
             }
     if "tracks" in tables:
         picture.trackers = _blocks(run, "tracks")
@@ -111,7 +111,7 @@ def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
             "level": run.values("alerts", "level"), **plain("alerts", *_LEVELS),
         }  # fmt: skip
         if run.has("alerts", "track"):
-            tables["alerts"]["track"] = _whole(run.values("alerts", "track"))
+            tables["alerts"]["track"] = _track_numbers_of(run.values("alerts", "track"))
     if "manoeuvres" in run.tables:
         tables["manoeuvres"] = plain("manoeuvres", "time_s", "turn_rad", "climb_m")
     if "bands" in run.tables:
@@ -160,7 +160,7 @@ def _sources(run: RecordedTables, table: str) -> dict[str, AnyArray]:
     return {"source": _codes(run.texts(table, "block"), names)} if names else {}
 
 
-def _whole(column: Any) -> AnyArray:
+def _track_numbers_of(column: Any) -> AnyArray:
     """Return numbers of tracks, -1 where there is none."""
     numbers = np.asarray(column, dtype=float)
     return np.where(np.isfinite(numbers), numbers, _NO_TARGET).astype(np.int64)
@@ -231,7 +231,7 @@ class _Poses:
         self, table: str, names: list[str], rows: IntArray
     ) -> tuple[FloatArray, FloatArray]:
         time_s, first = np.unique(self._run.numbers(table, "time_s")[rows], return_index=True)
-        return time_s, self._run.stacked(table, names, rows[first])
+        return time_s, self._run.stack_columns(table, names, rows[first])
 
     def at(self, table: str, time_s: FloatArray, rows: IntArray | None = None) -> FloatArray:
         """Return the latest poses, at some times, of what carries the blocks of a table's rows."""
@@ -247,7 +247,9 @@ class _Poses:
         return result
 
 
-def _own_columns(time_s: FloatArray, own: FloatArray, plane: TangentPlane) -> dict[str, AnyArray]:
+def _ownship_columns(
+    time_s: FloatArray, own: FloatArray, plane: TangentPlane
+) -> dict[str, AnyArray]:
     east, north = plane.east_north_m(*own[:3])
     return {
         "time_s": time_s,
@@ -290,8 +292,8 @@ def _estimates(
         return run.numbers("state_tracks", name)[keep]
 
     time_s = column("time_s")
-    origin = run.stacked("state_tracks", ORIGIN, keep)
-    ends = offset_positions(run.stacked("state_tracks", POSITION, keep), origin)
+    origin = run.stack_columns("state_tracks", ORIGIN, keep)
+    ends = offset_positions(run.stack_columns("state_tracks", POSITION, keep), origin)
     east, north = plane.east_north_m(*ends)
     from_east, from_north = plane.east_north_m(*poses.at("state_tracks", time_s, keep)[:3])
     turned = plane.turned_rad(origin)
@@ -327,14 +329,14 @@ def _pose_at(own_s: FloatArray, own: FloatArray, time_s: FloatArray) -> FloatArr
     return np.stack([np.append(values, np.nan)[row] for values in own])
 
 
-def _seen(
+def _lines_of_sight(
     run: RecordedTables, table: str, pose: FloatArray, plane: TangentPlane
 ) -> dict[str, AnyArray]:
     """Return where measured lines of sight point, and where they end if they have a range.
 
     Bearings are from north; what is not known is NaN.
     """
-    line = run.stacked(table, LINE)
+    line = run.stack_columns(table, LINE)
     from_east, from_north = plane.east_north_m(*pose[:3])
     bearing, end = sights(line, pose)
     east_m, north_m = plane.east_north_m(*end)

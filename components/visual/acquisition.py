@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, not_negative, positive, unflatten
+from components.arguments.checks import broadcast_flat, check_not_negative, positive, unflatten
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: Per steradian and second, of pilots whom nothing has told where to look (ATC-152, 1991).
@@ -46,10 +46,10 @@ def acquisition_rate(
     visibility (2 %). ValueError where an argument is out of range or not finite.
     """
     shape, (area, distance, beta, extinction) = broadcast_flat(
-        area_m2=not_negative("area_m2", area_m2),
+        area_m2=check_not_negative("area_m2", area_m2),
         range_m=positive("range_m", range_m),
-        beta_per_sr_s=not_negative("beta_per_sr_s", beta_per_sr_s),
-        extinction_per_m=not_negative("extinction_per_m", extinction_per_m),
+        beta_per_sr_s=check_not_negative("beta_per_sr_s", beta_per_sr_s),
+        extinction_per_m=check_not_negative("extinction_per_m", extinction_per_m),
     )
     with np.errstate(under="ignore"):
         return unflatten(beta * area / distance**2 * np.exp(-extinction * distance), shape)
@@ -80,13 +80,15 @@ def closing_opportunity(
     nearest = float(positive("to_m", to_m))
     if not from_m >= nearest:
         raise ValueError(f"from_m is {from_m:g}: it must be at least to_m, {nearest:g}")
-    extinction = float(not_negative("extinction_per_m", extinction_per_m))
+    extinction = float(check_not_negative("extinction_per_m", extinction_per_m))
 
     def beyond(range_m: float) -> float:
         return float(expn(2, extinction * range_m)) / range_m if range_m < np.inf else 0.0
 
-    scale = float(not_negative("beta_per_sr_s", beta_per_sr_s))
-    scale *= float(not_negative("area_m2", area_m2)) / float(positive("closing_mps", closing_mps))
+    scale = float(check_not_negative("beta_per_sr_s", beta_per_sr_s))
+    scale *= float(check_not_negative("area_m2", area_m2)) / float(
+        positive("closing_mps", closing_mps)
+    )
     return scale * (beyond(nearest) - beyond(from_m))
 
 

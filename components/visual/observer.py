@@ -112,7 +112,7 @@ class LookoutParameters(SensorParameters):
     )
 
     @model_validator(mode="after")
-    def _somebody_sits_there(self) -> Self:
+    def _check_seats(self) -> Self:
         low, high = self.azimuth_deg
         if self.right_looking and not (-180.0 <= low < 0.0 < high <= 180.0):
             raise ValueError(
@@ -245,7 +245,7 @@ class Lookout(Sensor):
         return [*super().warnings(), *cells_warnings(self)]
 
     def request(self, port: str) -> Any:
-        """Ask for the flights too: aircraft are found between scans."""
+        """Ask for the flights too: aircraft may be acquired between scans."""
         reach = super().request(port)
         along = self.p.enabled and self.p.between_scans == "integral"
         return replace(reach, lasts_s=self._period_s) if along else reach
@@ -262,7 +262,7 @@ class Lookout(Sensor):
         ]
 
     def look(self, cells: Cells) -> Look:
-        """See whoever is found since the last scan, or was before."""
+        """Report aircraft acquired since the last scan, or earlier."""
         who = cells.run * len(cells.roster.names) + cells.target
         missing = int(who.max(initial=-1)) + 1 - len(self._first_seen)
         if missing > 0:
@@ -272,10 +272,10 @@ class Lookout(Sensor):
         limit = self._smallest_rad or _ARCMIN_RAD
         confidence = size / limit - 1.0
         extras: dict[str, AnyArray] = {}
-        if self._says_looks:
+        if self._is_asked_for_looks:
             extras["detection_probability"] = self.acquisition_probability(cells)
         searched = np.flatnonzero(self._first_seen[who] > cells.scan)
-        result = searched[self._found(cells, searched)]
+        result = searched[self._draw_acquisitions(cells, searched)]
         first = self._first_seen.copy()
         np.minimum.at(first, who[result], cells.scan[result])
         self._first_seen = first
@@ -283,25 +283,25 @@ class Lookout(Sensor):
         return Look(seen, confidence, extras)
 
     def acquisition_probability(self, cells: Cells) -> FloatArray:
-        """Return with which probability each cell's aircraft is found since the last scan.
+        """Return the probability that each cell's aircraft was acquired since the last scan.
 
         For who was not found before. A search that comes round finds it with the share of a round
         for which it showed, over all phases.
         """
-        expected = self._expected(cells, np.arange(len(cells)))
+        expected = self._expected_acquisitions(cells, np.arange(len(cells)))
         return np.minimum(expected, 1.0) if self.p.search == "round" else -np.expm1(-expected)
 
-    def _expected(self, cells: Cells, which: IntArray) -> FloatArray:
+    def _expected_acquisitions(self, cells: Cells, which: IntArray) -> FloatArray:
         """Return the expected number of acquisitions of some cells since the last scan."""
         total = np.zeros(len(which))
         for seat in self._seats:
-            total += self._share(seat, cells, which) * self._searched(seat, cells, which)
+            total += self._share(seat, cells, which) * self._search_integral(seat, cells, which)
         return total
 
-    def _found(self, cells: Cells, which: IntArray) -> BoolArray:
-        """Return which of some cells' aircraft are found since the last scan."""
+    def _draw_acquisitions(self, cells: Cells, which: IntArray) -> BoolArray:
+        """Draw which of some cells' aircraft were acquired since the last scan."""
         if self.p.search == "random":
-            expected = self._expected(cells, which)
+            expected = self._expected_acquisitions(cells, which)
             keys = cells.roster.keys_of(cells.target[which])
             finds = self._finds.of_runs(cells.run[which], cells.instant_ns[which])
             drawn = finds.uniform(keys, cells.scan[which])
@@ -311,9 +311,9 @@ class Lookout(Sensor):
             result |= self._meets(seat, cells, which)
         return result
 
-    def _searched(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
+    def _search_integral(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
         """Return the integral of the rate since the last scan, or how many rounds it showed."""
-        before_s = self._before_s(cells, which)
+        before_s = self._since_last_scan_s(cells, which)
         if not len(which):
             return before_s
         if self.p.between_scans == "as_at_scan":
@@ -339,11 +339,11 @@ class Lookout(Sensor):
         mine, share = which[looks], share[looks]
         keys = cells.roster.keys_of(cells.target[mine])
         round_s = self.p.round_s / share
-        phase_s = round_s * _once_a_run(self._phases, cells.run[mine], keys, seat.number)
+        phase_s = round_s * _draw_once_per_run(self._phases, cells.run[mine], keys, seat.number)
         now_s = cells.state_ns[mine] / NANOSECONDS
         # The last instant up to now at which the search was at its place, in (last scan, now].
         ahead_s = -np.remainder(now_s - phase_s, round_s)
-        in_time = np.flatnonzero(-ahead_s < self._before_s(cells, mine))
+        in_time = np.flatnonzero(-ahead_s < self._since_last_scan_s(cells, mine))
         met = np.zeros(len(which), dtype=bool)
         if len(in_time) and self.p.between_scans == "integral":
             there = _SeenBefore(cells, mine[in_time], ahead_s[in_time])
@@ -352,7 +352,7 @@ class Lookout(Sensor):
             met[looks[in_time]] = self._shows(seat, cells)[mine[in_time]]
         return met
 
-    def _before_s(self, cells: Cells, which: IntArray) -> FloatArray:
+    def _since_last_scan_s(self, cells: Cells, which: IntArray) -> FloatArray:
         """Return how long since the last scan, or since the run began; as at the scan, a period."""
         if self.p.between_scans == "as_at_scan":
             return np.full(len(which), self._period_s)
@@ -363,7 +363,7 @@ class Lookout(Sensor):
         if self.p.looking == "glances":
             return np.full(len(which), seat.share)
         nobody = np.zeros(len(which), dtype=np.uint64)
-        drawn = _once_a_run(self._attends, cells.run[which], nobody, seat.number)
+        drawn = _draw_once_per_run(self._attends, cells.run[which], nobody, seat.number)
         return np.where(drawn < seat.share, 1.0, 0.0)
 
     def _area(self, view: Any) -> FloatArray:
@@ -393,6 +393,6 @@ class Lookout(Sensor):
         return np.asarray(shows)
 
 
-def _once_a_run(stream: Stream, run: IntArray, keys: AnyArray, number: int) -> FloatArray:
+def _draw_once_per_run(stream: Stream, run: IntArray, keys: AnyArray, number: int) -> FloatArray:
     """Return uniform draws that stay the same throughout a run."""
     return stream.of_runs(run).uniform(keys, np.zeros(len(run), dtype=np.int64), number)

@@ -8,9 +8,9 @@ from components.well_clear.relative_motion import (
     Horizontal,
     Span,
     horizontal_of,
-    surely_less,
+    is_surely_less,
+    meets_within_time,
     vertical_span,
-    within_time,
 )
 from components.well_clear.tcas import TcasAdvisory, tcas_span
 from components.well_clear.volume import Relative, Volume, horizontal_span, violation_span
@@ -44,7 +44,7 @@ def uncertain_violation_span(
     horizontal = _horizontal(volume, (east, north, v_east, v_north), motion, e, end_s)
     entry = np.maximum(np.maximum(vertical.begin_s, horizontal.begin_s), begin_s)
     leave = np.minimum(vertical.end_s, horizontal.end_s)
-    span = _only(Span(entry, leave), surely_less(entry, leave))
+    span = _restrict_span(Span(entry, leave), is_surely_less(entry, leave))
     known = np.asarray(sum(bounds) == 0.0)  # none is negative
     if not known.any():
         return span
@@ -66,11 +66,11 @@ def _upper_part(volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, en
     def span(height: FloatArray, rate: FloatArray) -> Span:
         return vertical_span(height, rate, volume.vertical_m, volume.vertical_time_s, 0.0, end_s)
 
-    leaving = _only(span(low, np.maximum(slow, 0.0)), (high >= 0.0) & (fast >= 0.0))
+    leaving = _restrict_span(span(low, np.maximum(slow, 0.0)), (high >= 0.0) & (fast >= 0.0))
     first, last = span(low, slow), span(high, np.minimum(fast, 0.0))
     ends = np.where(np.isfinite(last.begin_s), last.end_s, end_s)
     there = (high >= 0.0) & (slow <= 0.0) & np.isfinite(first.begin_s)
-    return _hull(leaving, _only(Span(first.begin_s, ends), there))
+    return _hull(leaving, _restrict_span(Span(first.begin_s, ends), there))
 
 
 def _horizontal(
@@ -84,7 +84,7 @@ def _horizontal(
     range_m, speed = np.sqrt(motion.range_sq_m2), np.sqrt(motion.speed_sq_m2_s2)
     reach = radius_m + e.position_m
     near = range_m <= reach
-    now = near | within_time(motion, radius_m, tau_s, volume.time_variable)
+    now = near | meets_within_time(motion, radius_m, tau_s, volume.time_variable)
     slow = speed <= e.velocity_mps
     nearest, fastest = np.maximum(range_m - e.position_m, 0.0), speed + e.velocity_mps
     zero = np.zeros(np.shape(range_m))
@@ -144,7 +144,7 @@ def _worst_pair(
     )
 
 
-def _only(span: Span, where: BoolArray) -> Span:
+def _restrict_span(span: Span, where: BoolArray) -> Span:
     return Span(np.where(where, span.begin_s, np.inf), np.where(where, span.end_s, -np.inf))
 
 
@@ -177,6 +177,6 @@ def detection_span(
     return violation_span(volume, relative, begin_s, end_s)
 
 
-def some_bounds(bounds: Bounds | None, which: Any) -> Bounds | None:
+def select_bounds(bounds: Bounds | None, which: Any) -> Bounds | None:
     """Return the bounds of some pairs; None where there are none."""
     return None if bounds is None else Bounds(*(np.asarray(bound)[which] for bound in bounds))

@@ -21,8 +21,8 @@ class Missed(NamedTuple):
     """How encounters pass a cylinder, m, (runs,): to the side and up or down at the closest.
 
     Then how near to the side while about its height apart or less, and how near up or down while
-    about its radius apart or less (`widened`); infinite where they never are. NaN where nobody is
-    met.
+    about its radius apart or less (`widen_cylinders`); infinite where they never are. NaN where
+    nobody is met.
     """
 
     level: FloatArray
@@ -31,12 +31,14 @@ class Missed(NamedTuple):
     above: FloatArray
 
 
-def widened(sizes_m: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+def widen_cylinders(sizes_m: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     """Return cylinders that hold the little that manoeuvres move in the other direction."""
     return [((1.0 + _SLACK) * radius_m, (1.0 + _SLACK) * half_m) for radius_m, half_m in sizes_m]
 
 
-def led_into(size_m: tuple[float, float], missed: Missed, *, climbs: bool) -> FloatArray:
+def probability_led_into(
+    size_m: tuple[float, float], missed: Missed, *, climbs: bool
+) -> FloatArray:
     """Return how likely it is that a manoeuvre leads into a cylinder that is just missed, to 1.
 
     By a turn only where somebody is met at the same altitude: whom it brings nearer to the side

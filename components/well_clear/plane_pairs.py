@@ -35,7 +35,7 @@ class PairPaths:
     own_m: FloatArray
     other_m: FloatArray
 
-    def until(self, end_s: float) -> "PairPaths":
+    def cut_at(self, end_s: float) -> "PairPaths":
         """Return the paths from time 0 to an end, s."""
         time_s = self.time_s
         if not len(time_s) or (time_s[0] >= 0.0 and time_s[-1] <= end_s):
@@ -95,9 +95,9 @@ def meetings(
     )  # fmt: skip
     parts: list[tuple[AnyArray, ...]] = []
     for number, of in paths:
-        pairs = PairsInPlane(of.until(end_s))
+        pairs = PairsInPlane(of.cut_at(end_s))
         for k, limits in enumerate(sizes_m):
-            surely, maybe = pairs.inside(*limits)
+            surely, maybe = pairs.classify_inside(*limits)
             inside[k, number[surely]] = True
             unsure[k, number[maybe]] = True
         for k, limits in enumerate(missed_m):
@@ -157,17 +157,19 @@ class PairsInPlane:
             good &= np.abs(path[2]).max(axis=0, initial=0.0) <= _HIGHEST_M
             self.beyond |= ~(good & (step_m <= _LONGEST_M))
 
-    def inside(self, horizontal_m: float, vertical_m: float) -> tuple[BoolArray, BoolArray]:
+    def classify_inside(
+        self, horizontal_m: float, vertical_m: float
+    ) -> tuple[BoolArray, BoolArray]:
         """Return which pairs surely come inside a cylinder, and of which that is unsure."""
         level, up, half = self._level_m, self._apart[2], self._half_m
-        outer = self._widened(horizontal_m, 1.0), vertical_m + _MARGIN_M
+        outer = self._widen_size(horizontal_m, 1.0), vertical_m + _MARGIN_M
         nearest = np.minimum(level[:-1], level[1:]) - half
         lowest, highest = np.minimum(up[:-1], up[1:]), np.maximum(up[:-1], up[1:])
         step, pair = ((nearest < outer[0]) & (lowest < outer[1]) & (highest > -outer[1])).nonzero()
         apart, moved = self._apart[:, step, pair], self._moved[:, step, pair]
         maybe, surely = np.zeros((2, self._count), dtype=np.bool_)
         maybe[pair[_enters(apart, moved, *outer)]] = True
-        inner = self._widened(horizontal_m, -1.0), vertical_m - _MARGIN_M
+        inner = self._widen_size(horizontal_m, -1.0), vertical_m - _MARGIN_M
         if min(inner) > 0.0:
             surely[pair[_enters(apart, moved, *inner)]] = True
         surely &= ~self.beyond
@@ -182,7 +184,7 @@ class PairsInPlane:
         lowest, highest = np.minimum(up[:-1], up[1:]), np.maximum(up[:-1], up[1:])
         step, pair = ((lowest < vertical_m) & (highest > -vertical_m)).nonzero()
         apart, moved = self._apart[:, step, pair], self._moved[:, step, pair]
-        begin, end = _within_height(apart[2], moved[2], vertical_m)
+        begin, end = _interval_in_height(apart[2], moved[2], vertical_m)
         squared = moved[0] ** 2 + moved[1] ** 2
         part = -(apart[0] * moved[0] + apart[1] * moved[1])
         part = part / np.where(squared > 0.0, squared, 1.0)
@@ -192,7 +194,7 @@ class PairsInPlane:
         nearest = np.minimum(self._level_m[:-1], self._level_m[1:]) - self._half_m
         step, pair = (nearest < horizontal_m).nonzero()
         apart, moved = self._apart[:, step, pair], self._moved[:, step, pair]
-        begin, end, crosses = _within_radius(apart, moved, horizontal_m)
+        begin, end, crosses = _interval_in_radius(apart, moved, horizontal_m)
         begin, end = np.maximum(begin, 0.0), np.minimum(end, 1.0)
         there = (crosses & (begin < end)).nonzero()[0]
         ends = apart[2, there] + np.array([begin[there], end[there]]) * moved[2, there]
@@ -212,7 +214,7 @@ class PairsInPlane:
         range_m = np.sqrt(self._level_m**2 + self._apart[2] ** 2)
         sample, every = np.argmin(range_m, axis=0), np.arange(self._count)
         steps = np.maximum(sample - 1, 0), np.minimum(sample, len(self._lasts_s) - 1)
-        before, after = (self._closest_on(step, every) for step in steps)
+        before, after = (self._closest_between_samples(step, every) for step in steps)
         nearer = after[3] < before[3]
         time_s, level_m, up_m, best_m = np.where(nearer, after, before)
         own, other = self._ways(np.where(nearer, steps[1], steps[0]), every)
@@ -222,7 +224,7 @@ class PairsInPlane:
         near = np.minimum(range_m[:-1], range_m[1:]) - self._half_m - 0.5 * np.abs(self._moved[2])
         near_by: BoolArray = near < best_m + _slack_m(best_m)
         step, pair = near_by.nonzero()
-        here_m = self._closest_on(step, pair)[3]
+        here_m = self._closest_between_samples(step, pair)[3]
         near_by[step, pair] = here_m < best_m[pair] + _slack_m(best_m[pair])
         wider = near_by.copy()
         wider[1:] |= near_by[:-1]
@@ -257,7 +259,7 @@ class PairsInPlane:
         # One after the other, so that a pair alone has the same bits as among many.
         return each_s.cumsum(axis=0)[-1] if len(each_s) else np.full(self._count, np.nan)
 
-    def _closest_on(self, step: IntArray, pair: IntArray) -> FloatArray:
+    def _closest_between_samples(self, step: IntArray, pair: IntArray) -> FloatArray:
         """Return time, horizontal and vertical distance and range, on the way from samples on."""
         apart, moved = self._apart[:, step, pair], self._moved[:, step, pair]
         squared = (moved**2).sum(axis=0)
@@ -277,7 +279,7 @@ class PairsInPlane:
         return own, other
 
     @staticmethod
-    def _widened(size_m: float, sign: float) -> float:
+    def _widen_size(size_m: float, sign: float) -> float:
         return size_m + sign * (_MARGIN_M + _MARGIN * size_m)
 
 
@@ -292,15 +294,15 @@ def _enters(
     apart: FloatArray, moved: FloatArray, horizontal_m: float, vertical_m: float
 ) -> BoolArray:
     """Return which straight ways from `apart` on, both (3, n), come inside a cylinder."""
-    begin, end, crosses = _within_radius(apart, moved, horizontal_m)
-    low, high = _within_height(apart[2], moved[2], vertical_m)
+    begin, end, crosses = _interval_in_radius(apart, moved, horizontal_m)
+    low, high = _interval_in_height(apart[2], moved[2], vertical_m)
     first = np.maximum(np.maximum(begin, low), 0.0)
     last = np.minimum(np.minimum(end, high), 1.0)
     entered: BoolArray = crosses & (first < last)
     return entered
 
 
-def _within_radius(
+def _interval_in_radius(
     apart: FloatArray, moved: FloatArray, horizontal_m: float
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Return from which to which part of straight ways they are within a radius; and if at all."""
@@ -317,7 +319,7 @@ def _within_radius(
     return begin, end, crosses
 
 
-def _within_height(
+def _interval_in_height(
     up: FloatArray, climbed: FloatArray, vertical_m: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return from which to which part of straight ways they are within so much up or down."""

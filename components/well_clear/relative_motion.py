@@ -36,7 +36,7 @@ def nearly_equal(
     return np.asarray((alike & ~zero) | (zero & both_tiny))
 
 
-def surely_less(first: Any, second: Any) -> BoolArray:
+def is_surely_less(first: Any, second: Any) -> BoolArray:
     """Tell whether one number lies below another, and not only by rounding."""
     first, second = np.asarray(first), np.asarray(second)
     less = np.asarray(first < second)
@@ -177,7 +177,7 @@ def time_to_entry_s(motion: Horizontal, distance_m: float) -> FloatArray:
     return np.asarray(np.where((motion.closing_m2_s < 0.0) & (delta >= 0.0), time_s, NEVER))
 
 
-def within_time(
+def meets_within_time(
     motion: Horizontal, distance_m: float, time_s: float, time_variable: str
 ) -> BoolArray:
     """Tell whether the flight passes within a distance and its time variable is short enough.

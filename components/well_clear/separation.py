@@ -122,7 +122,7 @@ def first_inside_cylinder(
         half = 0.5 * length
         across_m, high_m = apart(pair, start + half[pair])
         drift_m = (closing_mps * half)[pair]
-        maybe, within = _judged(across_m, high_m, drift_m, horizontal_m, vertical_m)
+        maybe, within = _classify_pieces(across_m, high_m, drift_m, horizontal_m, vertical_m)
         pieces = np.bincount(pair[maybe], minlength=len(length))
         last = ((length <= FINEST_S) | (2 * pieces > _MOST_PIECES))[pair]
         inside = (across_m < horizontal_m) & (high_m < vertical_m)
@@ -136,7 +136,7 @@ def first_inside_cylinder(
     return np.where(np.isfinite(earliest), earliest, np.nan)
 
 
-def _judged(
+def _classify_pieces(
     across_m: FloatArray,
     high_m: FloatArray,
     drift_m: FloatArray | float,

@@ -79,7 +79,7 @@ def altimeter_scales(altitude_m: Any, mode_c: bool) -> tuple[tuple[FloatArray, F
     return ((good, SCALE_M[layer]), (1.0 - good, POOR_SCALE_M[layer]))
 
 
-def difference_beyond(height_m: Any, scale_m: Any, other_scale_m: Any) -> FloatArray:
+def laplace_difference_exceedance(height_m: Any, scale_m: Any, other_scale_m: Any) -> FloatArray:
     """Return the chance that the difference of two Laplace errors exceeds a height of any sign.
 
     With c = 1/λ of either error, the tail is a mixture of exponentials; nearly equal scales are
@@ -127,8 +127,8 @@ def collision_probability(
     within = np.zeros(np.shape(height))
     for chance, scale in altimeter_scales(altitude_m[0], mode_c[0]):
         for other_chance, other in altimeter_scales(altitude_m[1], mode_c[1]):
-            inside = difference_beyond(-vertical_m - height, scale, other) - difference_beyond(
-                vertical_m - height, scale, other
-            )
+            inside = laplace_difference_exceedance(
+                -vertical_m - height, scale, other
+            ) - laplace_difference_exceedance(vertical_m - height, scale, other)
             within = within + chance * other_chance * inside
     return np.asarray(np.where(np.asarray(miss_distance_m) < horizontal_m, within, 0.0))

@@ -11,8 +11,8 @@ from components.well_clear.relative_motion import (
     discriminant,
     exit_of_circle_s,
     horizontal_of,
+    is_surely_less,
     nearly_zero,
-    surely_less,
     vertical_span,
 )
 from components.well_clear.volume import Relative
@@ -128,15 +128,17 @@ def tcas_span(
     for sizes, bottom_m, top_m in zip(table, bottoms, tops, strict=True):
         if sizes is None:
             continue
-        first_s, till_s = _within(altitude_m, climb_mps, bottom_m, top_m, begin_s, end_s)
+        first_s, till_s = _interval_between_altitudes(
+            altitude_m, climb_mps, bottom_m, top_m, begin_s, end_s
+        )
         span = _span(relative, sizes, first_s, np.maximum(till_s, first_s))
-        there = surely_less(first_s, till_s)
+        there = is_surely_less(first_s, till_s)
         entry = np.where(there, np.minimum(entry, span.begin_s), entry)
         leave = np.where(there, np.maximum(leave, span.end_s), leave)
     return Span(entry, leave)
 
 
-def _within(
+def _interval_between_altitudes(
     altitude_m: FloatArray,
     climb_mps: FloatArray,
     bottom_m: float,
@@ -160,7 +162,7 @@ def _span(relative: Relative, sizes: Thresholds, begin_s: FloatArray, end_s: Flo
     """Return the interval of one sensitivity level's advisory in [begin, end]."""
     east, north, up, v_east, v_north, climb = (np.asarray(x, dtype=np.float64) for x in relative)
     vertical = vertical_span(up, climb, sizes.height_m, sizes.tau_s, begin_s, end_s)
-    some = surely_less(vertical.begin_s, vertical.end_s)
+    some = is_surely_less(vertical.begin_s, vertical.end_s)
     start = np.where(some, vertical.begin_s, 0.0)
     length = np.where(some, vertical.end_s - start, 0.0)
     motion = horizontal_of(east + start * v_east, north + start * v_north, v_east, v_north)
@@ -188,5 +190,5 @@ def _span(relative: Relative, sizes: Thresholds, begin_s: FloatArray, end_s: Flo
         past = exit_of_circle_s(motion, sizes.miss_m, np.sqrt(np.maximum(miss, 0.0)))
         leave = np.where(still, leave, np.minimum(leave, past))
         some &= filtered
-    some &= surely_less(start + entry, start + leave)
+    some &= is_surely_less(start + entry, start + leave)
     return Span(np.where(some, start + entry, np.inf), np.where(some, start + leave, -np.inf))

@@ -16,12 +16,12 @@ from components.well_clear.relative_motion import (
     entry_of_circle_s,
     exit_of_circle_s,
     horizontal_of,
+    is_surely_less,
+    meets_within_time,
     nearly_equal,
     nearly_zero,
-    surely_less,
     time_to_closest_s,
     vertical_span,
-    within_time,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray
 
@@ -90,13 +90,13 @@ def horizontal_span(motion: Horizontal, volume: Volume, duration_s: float | Floa
     inside = motion.range_sq_m2 <= radius_m * radius_m
     leave = exit_of_circle_s(motion, radius_m, root)
     leave = np.where(inside & still, duration_s, np.minimum(leave, duration_s))
-    entry, ahead = _entry_from_outside(motion, volume, delta, root, still)
+    entry, ahead = _entry_time_from_outside(motion, volume, delta, root, still)
     entry = np.where(inside, 0.0, np.maximum(entry, 0.0))
     met = inside | (ahead & (delta >= 0.0) & (p <= 0.0) & (entry <= duration_s))
     return Span(np.where(met, entry, np.inf), np.where(met, leave, -np.inf))
 
 
-def _entry_from_outside(
+def _entry_time_from_outside(
     motion: Horizontal, volume: Volume, delta: FloatArray, root: FloatArray, still: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
     """Return the entry of those who are not yet within the radius, and whether there is one."""
@@ -146,7 +146,7 @@ def violates(volume: Volume, relative: Relative) -> BoolArray:
     east, north, up, v_east, v_north, climb = _arrays(relative)
     motion = horizontal_of(east, north, v_east, v_north)
     radius_m = volume.horizontal_m
-    near = (motion.range_sq_m2 <= radius_m * radius_m) | within_time(
+    near = (motion.range_sq_m2 <= radius_m * radius_m) | meets_within_time(
         motion, radius_m, volume.horizontal_time_s, volume.time_variable
     )
     closing = (climb != 0.0) & (up * climb <= 0.0)
@@ -180,13 +180,13 @@ def violation_span(
     """
     east, north, up, v_east, v_north, climb = _arrays(relative)
     vertical = vertical_span(up, climb, volume.vertical_m, volume.vertical_time_s, begin_s, end_s)
-    some = surely_less(vertical.begin_s, vertical.end_s)
+    some = is_surely_less(vertical.begin_s, vertical.end_s)
     start = np.where(some, vertical.begin_s, 0.0)
     motion = horizontal_of(east + start * v_east, north + start * v_north, v_east, v_north)
     duration = np.where(some, vertical.end_s - start, 0.0)
     within = horizontal_span(motion, volume, duration)
     entry, leave = start + within.begin_s, start + within.end_s
-    some &= surely_less(entry, leave)
+    some &= is_surely_less(entry, leave)
     return Span(np.where(some, entry, np.inf), np.where(some, leave, -np.inf))
 
 
@@ -194,7 +194,7 @@ def _arrays(relative: Relative) -> list[FloatArray]:
     return [np.asarray(part, dtype=np.float64) for part in relative]
 
 
-def inside_cylinder(
+def is_inside_cylinder(
     distance_m: FloatArray, height_m: FloatArray, horizontal_m: float, vertical_m: float
 ) -> BoolArray:
     """Tell whether aircraft are within a cylinder now, its boundary left out."""
@@ -230,5 +230,5 @@ def cylinder_span(
     some = np.where(still, near, delta > 0.0) & (~level | (np.abs(up) < vertical_m))
     entry = np.minimum(np.maximum(entry, begin_s), end_s)
     leave = np.maximum(np.minimum(leave, end_s), begin_s)
-    some = some & surely_less(entry, leave)
+    some = some & is_surely_less(entry, leave)
     return Span(np.where(some, entry, np.inf), np.where(some, leave, -np.inf))

@@ -97,16 +97,23 @@ _WAYS: tuple[tuple[str, Mapping[str, Any], str, str], ...] = (
 
 _HEAD = """# Thresholds, clutter and Doppler
 
-What a radar reports rests on one threshold. This page says what it follows, what ground clutter
-and rain do to it, and what a moving-target filter takes out; keys are in the
-[reference](reference.md), physics in `components/radar/`.
+How far does a radar see over ground and in rain, with which filter, and how many of its reports
+are false?
+
+> `dsa-des run first_light --set terrain.height_m=0 --set weather.rain_rate_mm_h=4`
+> `--set blocks.radar.false_alarms=true --set blocks.radar.false_alarm_probability=1e-6`
+
+![Range of Pd 0.5 over reflectivity of the ground, and over speed](images/{figure})
+
+The picture is that of an [encounter below](#effect-on-range); keys are in the
+[reference](reference.md).
 
 ## One threshold
 
 `false_alarm_probability` is that of one look at one resolution cell. It sets the threshold that
 detections cross, and with `false_alarms = true` noise crosses it in every cell of the field of
 view: a scan has (cells · Pfa) false alarms on average. The thesis's 0.05 is meant for a look at a
-target; with false alarms it fills one cell in twenty, and `check` and `run` say what that comes to:
+target; with false alarms it fills one cell in twenty, and `check` and `run` warn of it:
 
 ```text
 false_alarms is true and false_alarm_probability is 0.05: with 15,000 resolution cells that makes
@@ -114,23 +121,23 @@ false_alarms is true and false_alarm_probability is 0.05: with 15,000 resolution
 ```
 
 A range that calibrates a radar (`calibrate`) holds at the probability of false alarm of the file
-that states it, or at `calibrate.false_alarm_probability`. Who lowers `false_alarm_probability` in a
-scene, with `--set` or in a study raises the threshold; the hardware stays, Pd at that range falls,
-and `check` says to what.
+that states it, or at `calibrate.false_alarm_probability`. A lower `false_alarm_probability` in a
+scene, with `--set` or in a study raises the threshold; the hardware stays the same, Pd at that
+range falls, and `check` gives its value.
 
-A `radar.threshold` has the false alarms of its `threshold_db`, whatever `false_alarm_probability`
-says; where that leaves practically none, `check` says so.
+A `radar.threshold` has the false alarms of its `threshold_db`, whatever the
+`false_alarm_probability`; if that leaves practically none, `check` warns of it.
 
 A target far below the noise is reported with the probability of false alarm. Such a report lies in
-the target's resolution cell and says no more: on a grid it has the grid point of the cell; with
-`errors = "signal"`, it lies anywhere in the cell (evenly, with the variance of that), also where
-the cell is wider than the grid. With a resolution of 0 there is no cell, and reports are exact, as
-in the thesis.
+the target's resolution cell and has no more information: on a grid it has the grid point of the
+cell; with `errors = "signal"`, it is uniform over the cell (with that variance), also if the cell
+is wider than the grid. With a resolution of 0 there is no cell, and reports are exact, as in the
+thesis.
 
-Targets in one resolution cell (beam or grid step, by range) are one report: that of the strongest
-echo, looked at with the sum of their powers. So it is by default where `errors` is not `"grid"` and
+Targets in one resolution cell (beam or grid step, by range) make one report: that of the strongest
+echo, with the sum of their powers. This is the default if `errors` is not `"grid"` and
 cells have a size, and with `resolution_cells = true`; with `false`, and in the thesis, each target
-has its own. Filters do not tell two targets of one cell apart.
+has its own. Filters do not separate two targets of one cell.
 
 ## Clutter
 
@@ -156,11 +163,11 @@ without, `check` says that no weather changes it.
 ## Beams
 
 `azimuth_beamwidth_deg` and `elevation_beamwidth_deg` are the width of the beam, `range_cell_m` the
-depth of a cell; the grid of reports (`azimuth_resolution_deg` and so on) is how finely values are
-said, and stands for a beam only where none is given. Clutter, the number of false alarms and what
-is told apart go by the beam. A gain is 30,000 over the product of its beamwidths in degrees; where
-the two contradict each other by more than 3 dB, `check` says so. Every radar that is shipped states
-its beam: OASys's is not printed, and 5.8 deg follow from its gain.
+depth of a cell; the grid of reports (`azimuth_resolution_deg` and so on) is the step of reported
+values, and replaces a beam only if none is given. Clutter, the number of false alarms and the
+separation of targets depend on the beam. A gain is 30,000 over the product of its beamwidths in
+degrees; where the two contradict each other by more than 3 dB, `check` says so. Every radar that
+is shipped states its beam: OASys's is not printed, and 5.8 deg follow from its gain.
 
 - `sidelobe_level_db`: ground and rain at the target's range all around, at a mean level below the
   beam (a ring of 2π R ΔR of ground, and of rain a shell). By default there are no sidelobes.
@@ -176,42 +183,40 @@ ground). Of the radar below, at 5 km and 3 cm, by rain rate:
 
 {rain}
 
-Drops scatter after Rayleigh: up to 35 GHz, where the formula is within 4 dB of Mie's up to 25 mm/h;
-above, `check` says that it gives too much. A linear wave hears all of it; of a circular one the
-antenna rejects `rain_rejection_db`. Rain is noise that differs from look to look, and from pulse to
-pulse. Before a filter it moves with the wind and falls (2.6 Z^0.107 m/s), spread by turbulence (1
-m/s), shear over the beam (0.42 · 4 m/s/km · R φ) and the platform: a notch that is locked to the
-ground leaves rain that the wind blows. An average of cells follows rain as it follows the ground,
-and a threshold that stays reports it in every cell. A radar whose cells have no size hears no rain,
-and `check` says so.
+Drops scatter after Rayleigh: up to 35 GHz, where the formula is within 4 dB of Mie's up to 25
+mm/h; above, `check` warns that it gives too much. A linearly polarised antenna receives all of it;
+a circularly polarised one rejects `rain_rejection_db`. Rain is noise that differs from look to
+look, and from pulse to pulse. Before a filter it moves with the wind and falls (2.6 Z^0.107 m/s),
+spread by turbulence (1 m/s), shear over the beam (0.42 · 4 m/s/km · R φ) and the platform: a notch
+that is locked to the ground leaves rain that the wind blows. An average of cells follows rain as
+it follows the ground, and a fixed threshold reports it in every cell. A radar whose cells have no
+size receives no rain, and `check` warns of it.
 
 ## Doppler
 
-`moving_target_filter` (with `prf_hz`) adds up successive pulses so that what moves like the ground
-goes: `single_canceller`, `double_canceller`, or a `filter_bank` of `filter_pulses` pulses whose
-filters near the ground are not used (`notch_m_s`). The notch follows the range rate of the ground
-in the beam (`clutter_lock`), as the ownship flies over it: a target is lost when its *own* velocity
-over ground has no part along the line of sight, and at the blind speeds, multiples of λ·PRF/2.
-Measured range rates are the true ones, as if ambiguities were resolved by several PRF; with
-`range_rate_folds = true` they fold at the unambiguous velocity, λ·PRF/4. What is left of the
-clutter follows from its spread: the beam's width across the ownship's course (0.3 · speed ·
-beamwidth · sin), the ground's own motion (`[terrain] clutter_motion_m_s`), and
-`improvement_limit_db`. Cancellers keep the SNR of targets of all speeds on average, and gain for
-some; a bank loses {bank_loss:.1f} dB on average by its window and between its filters.
+`moving_target_filter` (with `prf_hz`) combines successive pulses so that echoes that move like the
+ground cancel: `single_canceller`, `double_canceller`, or a `filter_bank` of `filter_pulses` pulses
+whose filters near the ground are not used (`notch_m_s`). The notch follows the range rate of the
+ground in the beam (`clutter_lock`), as the ownship flies over it: a target is lost when its *own*
+velocity over ground has no part along the line of sight, and at the blind speeds, multiples of
+λ·PRF/2. Measured range rates are the true ones, as if ambiguities were resolved by several PRF;
+with `range_rate_folds = true` they fold at the unambiguous velocity, λ·PRF/4. The residual clutter
+follows from its spread: the beam's width across the ownship's course (0.3 · speed · beamwidth ·
+sin), the ground's own motion (`[terrain] clutter_motion_m_s`), and `improvement_limit_db`.
+Cancellers keep the SNR of targets of all speeds on average, and gain for some; a bank
+loses {bank_loss:.1f} dB on average by its window and between its filters.
 
-## What it does to range
+## Effect on range
 
 An intruder of 3 dBsm (Swerling I) flies 100 m above the ground towards an ownship 500 m higher,
 which flies at 50 m/s. The radar (10 GHz, PRF {prf:g} Hz, beam 2 by 4 deg, cells of 50 m, Pfa 1e-6)
 has Pd 0.5 at 5 km without clutter. Every point is the farthest range with Pd 0.5 in the
 rows of one run (`docs/make/clutter.py`).
 
-![Range of Pd 0.5 over reflectivity of the ground, and over speed](images/{figure})
-
-Left: clutter takes two thirds of the range at -20 dB; behind a filter, little of it. A threshold
-that stays at the noise would have it grow. Right, over ground of -20 dB: the notch at 0, and the
-blind speed of {blind:.0f} m/s, which an intruder that is seen at 1 km only, 30 deg below, has along
-the line of sight when it flies 15 % faster.
+In the [picture](images/{figure}), left: clutter takes two thirds of the range at -20 dB; behind
+a filter, little of it. A threshold that stays at the noise would have it grow. Right, over ground
+of -20 dB: the notch at 0, and the blind speed of {blind:.0f} m/s, which an intruder that is seen at
+1 km only, 30 deg below, has along the line of sight when it flies 15 % faster.
 
 Detections of such an encounter, {seeds} runs each:
 

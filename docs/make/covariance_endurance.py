@@ -14,14 +14,14 @@ import numpy as np
 from components.estimation.estimator import (
     Estimates,
     ExtendedKalmanFilter,
-    combined,
+    mixture_moments,
     pair_measurement,
 )
 from components.estimation.frame import SensorPose
 from components.estimation.interacting_models import InteractingMultipleModels
-from components.estimation.kalman import innovation, updated
-from components.estimation.measurement import Kind, expected, linearised, residual
-from components.estimation.modified_polar import moved_in_polar
+from components.estimation.kalman import innovation, update
+from components.estimation.measurement import Kind, expected_measurement, linearise, residual
+from components.estimation.modified_polar import correct_in_polar
 from components.estimation.motion import ConstantVelocity, CoordinatedTurn, predict
 from components.estimation.unscented import SigmaPoints, predict_unscented, unscented_moments
 from dsa_des.arrays.types import FloatArray
@@ -81,23 +81,27 @@ def endure(name: str, updates: int, count: int = 40, seed: int = 1) -> Endured:
         kind = Kind(k % 4 == 0)
         spread = variance[: kind.size]
         if name == "imm":
-            seen = expected(kind, truth, place) + rng.normal(size=spread.shape) * np.sqrt(spread)
+            seen = expected_measurement(kind, truth, place) + rng.normal(
+                size=spread.shape
+            ) * np.sqrt(spread)
             tracks = _interacting(tracks, dt, kind, place, seen, spread)
             continue
-        seen = expected(kind, truth, place) + rng.normal(size=spread.shape) * np.sqrt(spread)
+        seen = expected_measurement(kind, truth, place) + rng.normal(size=spread.shape) * np.sqrt(
+            spread
+        )
         if name == "ukf":
             state, covariance = predict_unscented(model, state, covariance, dt, _SIGMA)
             found = unscented_moments(kind, state, covariance, place, _SIGMA).innovation(spread)
         else:
             state, covariance = predict(model, state, covariance, dt)
-            found = innovation(*linearised(kind, state, place), covariance, spread)
-        after = updated(state, covariance, found, residual(seen, found.expected))
+            found = innovation(*linearise(kind, state, place), covariance, spread)
+        after = update(state, covariance, found, residual(seen, found.expected))
         if name == "polar" and not kind.has_range:
-            after = moved_in_polar(state, *after, place.position_m)
+            after = correct_in_polar(state, *after, place.position_m)
         state, covariance = after
     if name == "imm":
         worst = [_quality(spread) for spread in tracks.covariances]
-        state, covariance = combined(tracks)
+        state, covariance = mixture_moments(tracks)
         quality = min(least for least, _ in worst), max(apart for _, apart in worst)
         return Endured(*quality, _median_nees(state - truth, covariance))
     return Endured(*_quality(covariance), _median_nees(state - truth, covariance))

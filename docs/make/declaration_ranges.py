@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from components.arguments.checks import FloatArray
-from components.radar.detection import detection_probability, first_declared
+from components.radar.detection import detection_probability, first_declaration_probability
 from components.thesis.drawing import GREY, legend_below, panels
 from dsa_des.block.mark import BLUE, GREEN
 from dsa_des.library.study import study
@@ -63,7 +63,7 @@ def ranges_of_declaration(
         pulses=pulses if summed else 1,
         false_alarm_probability=a.false_alarm_probability,
     )
-    return range_m, first_declared(np.where(over, 0.0, pd), m, n) / _PHASES
+    return range_m, first_declaration_probability(np.where(over, 0.0, pd), m, n) / _PHASES
 
 
 def mean_range_m(range_m: FloatArray, probability: FloatArray) -> float:

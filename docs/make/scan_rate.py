@@ -35,16 +35,19 @@ M, N = 3, 5
 CERTAIN = 0.95
 _TICKS_HZ = (0.1, 0.2, 0.5, 1, 2, 5)
 
-_HEAD = """# Which scan rate?
+_HEAD = """# Choosing a scan rate
 
-`dsa-des study radar_dwell`
+How often should a radar scan?
 
-A radar that scans faster looks more often. In the thesis that costs nothing: every look has the
-same energy, and the fastest scan declares an intruder farthest out. A real beam is in one place at
-a time. With beamwidths, a PRF and `budget = "dwell"` each of a scan's beams gets the time that the
-scan leaves for it (`T = beams · dwell`), and the energy of a look follows from its pulses. Where
-nothing of the kind is stated a scan stays free; where beams and dwell are stated and `budget` is
-not, a scan rate that does not fit is refused:
+> `dsa-des study radar_dwell`
+
+![Range of declaration over scan rate, free and with a budget of time](images/{figure})
+
+In the thesis a faster scan costs nothing: every look has the same energy, and the fastest declares
+an intruder farthest out. A real beam points in one direction at a time. With beamwidths, a PRF and
+`budget = "dwell"` each of a scan's beams gets the time that the scan leaves for it (`T = beams ·
+dwell`), and the energy of a look follows from its pulses. Without beamwidths, PRF and dwell a scan
+stays free; with beams and dwell but no `budget`, a scan rate that does not fit is refused:
 
 ```text
 scan_rate_hz = 2: 38 x 7 beams of 0.003759 s (its dwell) take 1 s, and a scan has 0.5 s; it must be
@@ -56,14 +59,12 @@ comes nearer at {closing} m/s. It is declared after {m} detections in {n} looks.
 {replicas} runs each with their 95 % intervals; lines are computed from Pd alone
 (`docs/make/declaration_ranges.py`), without a run.
 
-![Range of declaration over scan rate, free and with a budget of time](images/{figure})
-
 """
 
 _WHY = """
 **The optimum.** {first} {second} {third}
 
-Declared by 95 % is what counts for keeping well clear; the mean has its optimum at {mean_best} Hz.
+Declaration by 95 % is relevant for keeping well clear; the mean has its optimum at {mean_best} Hz.
 A single detection needs no second look, so its own optimum lies below 0.1 Hz, where the target
 comes nearer by a tenth of its range between looks (Mallett & Brennan, Proc. IEEE 51(4), 1963).
 Pulses that are summed in power (`integration = "noncoherent"`, dotted) gain less from a

@@ -103,7 +103,7 @@ def find_alternatives(
         raise UsageError(
             f"--block {block}: the scene has no such block{did_you_mean(block, sorted(known))}"
         )
-    fixed = _fixed(study)
+    fixed = _keys_of_study(study)
     for name, ladder, at in _ladders(study, scenes, block, found):
         for rung in ladder.rungs:
             label = f"{name} {ladder.name}: {rung.name}"
@@ -116,7 +116,7 @@ def find_alternatives(
             _try(study, alternative, cells, answers, found)
     for text in listed:
         before = len(found.unavailable)
-        some = _listed(study, text, scenes[cells[0]], fixed)
+        some = _list_alternatives(study, text, scenes[cells[0]], fixed)
         for alternative in some:
             _try(study, alternative, cells, answers, found)
         wrong = found.unavailable[before:]
@@ -188,7 +188,9 @@ def _of_rung(
     return Alternative(label, tuple(sets), ((block, rung.type_name),) * bool(rung.type_name))
 
 
-def _listed(study: Study, text: str, scene: Scene, fixed: Mapping[Key, str]) -> list[Alternative]:
+def _list_alternatives(
+    study: Study, text: str, scene: Scene, fixed: Mapping[Key, str]
+) -> list[Alternative]:
     """Return what a user lists: the values of one key, or types of one block."""
     parsed = parse_assignment(text, "--vary")
     if isinstance(parsed, Problem):
@@ -212,7 +214,7 @@ def _listed(study: Study, text: str, scene: Scene, fixed: Mapping[Key, str]) -> 
     return some
 
 
-def _fixed(study: Study) -> dict[Key, str]:
+def _keys_of_study(study: Study) -> dict[Key, str]:
     """Return the keys that the study itself varies, and what varies them."""
     tables = study.base.data
     fixed: dict[Key, str] = {}

@@ -63,7 +63,7 @@ class PairedChange:
         return max(high - value, value - low)
 
     @property
-    def bound(self) -> float:
+    def largest_possible_change(self) -> float:
         """The largest change that the interval leaves possible; NaN where nothing is sure."""
         if self.reason or self.lost or self.gained or self.difference.few:
             return math.nan
@@ -82,7 +82,7 @@ def changes_by_model(
     each = confidence_of_each(confidence, comparisons)
     owns: dict[tuple[str, tuple[Any, ...]], Estimate] = {}
     changes = []
-    for model, at, base, chosen in rows.against(COLUMN, AS_IT_IS):
+    for model, at, base, chosen in rows.comparisons_with_baseline(COLUMN, AS_IT_IS):
         for result in results:
             key = result.name, at
             if key not in owns:
@@ -116,7 +116,7 @@ def _change(
         reason = f"{found.paired.count} runs are too few for an interval"
     presence = None
     if result.kind != RATIO and (found.only_first or found.only_second):
-        _, first, second = rows.paired(result.name, *pair)
+        _, first, second = rows.paired_values(result.name, *pair)
         has = [(~np.isnan(values)).astype(float) for values in (first, second)]
         presence = difference(has[0], has[1], confidence, kind=EVENT).paired
     return PairedChange(

@@ -21,7 +21,7 @@ from dsa_des.answers.verdicts import (
     verdict_of,
 )
 from dsa_des.results.labels import rounded_to, short, unit_of
-from dsa_des.results.printing import rounded
+from dsa_des.results.printing import round_estimate
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
@@ -90,18 +90,18 @@ class AnswerReport:
             if change is None or verdict.kind == NOTHING:
                 yield [verdict.model, cost, "", "", "", "", f"{said}: {verdict.reason}"]
                 continue
-            value, interval = rounded(change.difference)
+            value, interval = round_estimate(change.difference)
             yield [
                 verdict.model, cost, value, interval,
-                "" if change.identical else self._where(change),
+                "" if change.identical else self._location_text(change),
                 f"{change.differing:,} of {change.runs:,}", said + _remarks(change),
             ]  # fmt: skip
 
-    def _where(self, change: PairedChange) -> str:
+    def _location_text(self, change: PairedChange) -> str:
         return ", ".join(f"{n} = {short(v)}" for n, v in zip(self.axes, change.at, strict=True))
 
     def title_of(self, name: str) -> str:
-        """Return what stands above the table of a result."""
+        """Return the heading of a result's table."""
         unit = unit_of(name)
         return f"{name}{f', {unit}' if unit else ''}: each model in place of the scene's own"
 
@@ -117,11 +117,11 @@ class AnswerReport:
             rows.append(
                 {
                     "result": change.result.name, "model": change.model,
-                    "where": self._where(change) or None,
+                    "where": self._location_text(change) or None,
                     "as_it_is": _number(change.own.value), "as_it_is_low": _number(change.own.low),
                     "as_it_is_high": _number(change.own.high),
                     "change": _number(d.value), "low": _number(d.low), "high": _number(d.high),
-                    "limit": _number(self.limits[change.result.name].of(change.own.value)),
+                    "limit": _number(self.limits[change.result.name].amount_at(change.own.value)),
                     "few": d.few, "pairs": d.count, "runs": change.runs,
                     "differing": change.differing, "lost": change.lost, "gained": change.gained,
                     "neither": change.neither, "cut_off": change.cut_off,
@@ -143,11 +143,11 @@ class AnswerReport:
     # -- the sentences ------------------------------------------------------------------------
 
     def sentences(self, name: str) -> list[str]:
-        """Return what the table of a result comes to, the decision first."""
+        """Return the conclusions of a result's table, the decision first."""
         some = self.verdicts[name]
         result = next(one for one in self.results if one.name == name)
         lines = [self._of_itself(result)]
-        taken = sorted((v for v in some if v.may_be_taken), key=lambda v: self._cost(v.model))
+        taken = sorted((v for v in some if v.is_acceptable), key=lambda v: self._cost(v.model))
         limit = self._limit_text(name)
         sure = f"{100 * self.confidence:g} %"
         if taken:
@@ -170,8 +170,8 @@ class AnswerReport:
             return f"{result.name}: no model has runs to compare."
         texts = []
         for at, change in owns.items():
-            value, interval = rounded(change.own)
-            where = f" where {self._where(change)}" if at else ""
+            value, interval = round_estimate(change.own)
+            where = f" where {self._location_text(change)}" if at else ""
             texts.append(f"{value} ({interval.rstrip(' *') or 'no interval'}){where}")
         shown = texts if len(texts) <= _MOST_NAMED else [*texts[:_MOST_NAMED], "..."]
         many = max(change.own.count for change in owns.values())
@@ -186,7 +186,7 @@ class AnswerReport:
         if not limit.is_share:
             return f"{short(limit.amount)} {unit}".strip()
         text = f"{100 * limit.amount:g} %"
-        amounts = {limit.of(c.own.value) for c in self.changes if c.result.name == name}
+        amounts = {limit.amount_at(c.own.value) for c in self.changes if c.result.name == name}
         known = sorted(amount for amount in amounts if amount == amount)
         if not known:
             return text
@@ -227,7 +227,7 @@ class AnswerReport:
     def _bound_text(self, verdict: ModelVerdict) -> str:
         """Return what a model costs, and by how much it changes the result at most."""
         unit = unit_of(verdict.result.name)
-        mine = [c.bound for c in self.changes
+        mine = [c.largest_possible_change for c in self.changes
                 if (c.model, c.result.name) == (verdict.model, verdict.result.name)]  # fmt: skip
         return f"{self._cost(verdict.model):.2g}, at most {_plain(max(mine))} {unit}".rstrip()
 
@@ -245,13 +245,15 @@ class AnswerReport:
         parts = [amount_text(change)] if change.difference.value == change.difference.value else []
         if change.presence is not None:
             parts.append(_presence(change))
-        where = self._where(change)
+        where = self._location_text(change)
         return ", ".join(parts) + (f" where {where}" if where else "")
 
     def _open_text(self, verdict: ModelVerdict) -> str:
         change, wanted = verdict.change, verdict.wanted
         assert change is not None
-        parts = [amount_text(change) + (" where " + self._where(change) if change.at else "")]
+        parts = [
+            amount_text(change) + (" where " + self._location_text(change) if change.at else "")
+        ]
         if change.identical:
             parts[0] = f"the same in all {change.runs:,} runs, which leaves {parts[0]}"
         if change.presence is not None:
@@ -264,7 +266,7 @@ class AnswerReport:
             parts.append(f"some {wanted:,.0f} {self.unit} would")
         return ", ".join(parts)
 
-    def about(self) -> list[str]:
+    def notes_on_tables(self) -> list[str]:
         """Return what holds for all tables: how sure, how measured, and what was left out."""
         each = 100 * confidence_of_each(self.confidence, self.comparisons)
         turns = len({turn for turn, _ in self.turn_times.cpu_s})
@@ -331,5 +333,5 @@ def print_report(report: AnswerReport) -> None:
         for line in report.sentences(result.name):
             console.print(printable(line), markup=False, highlight=False)
     console.print()
-    for line in report.about():
+    for line in report.notes_on_tables():
         console.print(printable(line), markup=False, highlight=False)

@@ -11,9 +11,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from dsa_des.answers.changes import FEW_EVENTS, PairedChange
-from dsa_des.costs.climb import on_front
+from dsa_des.costs.climb import is_on_front
 from dsa_des.errors import UsageError, did_you_mean
-from dsa_des.results.labels import signed, unit_of
+from dsa_des.results.labels import format_with_interval, unit_of
 from dsa_des.results.record import FRACTION, NUMBER, Result
 from dsa_des.results.statistics import FEW
 
@@ -38,8 +38,8 @@ class Limit:
     amount: float
     is_share: bool
 
-    def of(self, answer: float) -> float:
-        """Return the amount at a place where the scene as it is gives an answer."""
+    def amount_at(self, answer: float) -> float:
+        """Return the limit as an amount, given the scene's own answer."""
         return self.amount * abs(answer) if self.is_share else self.amount
 
 
@@ -93,7 +93,7 @@ class ModelVerdict:
     on_front: bool = False
 
     @property
-    def may_be_taken(self) -> bool:
+    def is_acceptable(self) -> bool:
         """Whether its change is surely small enough."""
         return self.kind in (SAME, WITHIN)
 
@@ -101,25 +101,28 @@ class ModelVerdict:
 def verdict_of(
     model: str, result: Result, changes: Sequence[PairedChange], limit: Limit, failed: str
 ) -> ModelVerdict:
-    """Return what a model comes to; `failed` says why runs gave nothing, where they did not."""
+    """Return the verdict on a model; `failed` says why some runs gave no result."""
     if not changes:
         return ModelVerdict(
             model, result, NOTHING, None, math.nan, math.nan, failed or "no run of both"
         )
-    limits = [limit.of(change.own.value) for change in changes]
-    judged = [_judged(change, most) for change, most in zip(changes, limits, strict=True)]
+    limits = [limit.amount_at(change.own.value) for change in changes]
+    judged = [_judge(change, most) for change, most in zip(changes, limits, strict=True)]
     # The worst is told: what is surely beyond, then what is not known, then what weighs most.
     order = (BEYOND, NOTHING, OPEN, WITHIN, SAME)
     sizes = [_size(change, most) for change, most in zip(changes, limits, strict=True)]
     k = min(range(len(judged)), key=lambda k: (order.index(judged[k]), -sizes[k]))
     kind, change, most = judged[k], changes[k], limits[k]
-    weights = [_by(one.bound, amount) for one, amount in zip(changes, limits, strict=True)]
+    weights = [
+        _relative_to_limit(one.largest_possible_change, amount)
+        for one, amount in zip(changes, limits, strict=True)
+    ]
     weight = max(weights) if all(w == w for w in weights) else math.nan
-    wanted = _wanted(change, most) if kind == OPEN else math.nan
+    wanted = _units_needed(change, most) if kind == OPEN else math.nan
     return ModelVerdict(model, result, kind, change, most, weight, change.reason, wanted)
 
 
-def _judged(change: PairedChange, limit: float) -> str:
+def _judge(change: PairedChange, limit: float) -> str:
     interval = change.difference
     if change.reason:
         return NOTHING
@@ -139,20 +142,20 @@ def _judged(change: PairedChange, limit: float) -> str:
     return WITHIN
 
 
-def _by(amount: float, limit: float) -> float:
-    """Return an amount by a limit; where that is 0, nothing else is within it."""
+def _relative_to_limit(amount: float, limit: float) -> float:
+    """Return an amount divided by a limit; infinite where the limit is 0 and the amount is not."""
     if amount != amount or amount == 0.0:
         return amount
     return amount / limit if limit > 0.0 else math.inf
 
 
 def _size(change: PairedChange, limit: float) -> float:
-    size = _by(abs(change.difference.value), limit)
+    size = _relative_to_limit(abs(change.difference.value), limit)
     return size if size == size else math.inf
 
 
-def _wanted(change: PairedChange, limit: float) -> float:
-    """Return how many units would decide on a limit, if the change stays what it is."""
+def _units_needed(change: PairedChange, limit: float) -> float:
+    """Return how many units would decide on a limit, if the change keeps its mean and spread."""
     lost = change.lost + change.gained > 0
     room = abs(limit - abs(change.difference.value))
     # Where no run differs an interval shrinks with their number, else with its root.
@@ -184,11 +187,11 @@ def mark_front(verdicts: Sequence[ModelVerdict], costs: Mapping[str, float]) -> 
         known = cost == cost and verdict.kind != NOTHING
         points.append((cost, verdict.weight if known else math.nan))
     return [
-        best and point != points[0] for point, best in zip(points, on_front(points), strict=True)
+        best and point != points[0] for point, best in zip(points, is_on_front(points), strict=True)
     ][1:]
 
 
 def amount_text(change: PairedChange) -> str:
     """Return ``+1,240 ± 130 m``."""
     unit = unit_of(change.result.name)
-    return f"{signed(change.difference.value, change.half_width)} {unit}".strip()
+    return f"{format_with_interval(change.difference.value, change.half_width)} {unit}".strip()

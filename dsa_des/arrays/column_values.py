@@ -61,11 +61,11 @@ Schema = dict[str, str]
 
 
 def in_seconds(values: Any) -> Any:
-    """Return instants as seconds since the start of their run; other columns as they are."""
+    """Convert instants to seconds since the start of their run; return other columns unchanged."""
     return values.ticks / values.ticks_per_s if isinstance(values, Instants) else values
 
 
-def nothing_in(rows: int) -> AnyArray:
+def null_column(rows: int) -> AnyArray:
     """Return a float64 column that is null in all rows: one NaN, seen `rows` times."""
     return _NANS[:rows]
 
@@ -75,7 +75,7 @@ def is_empty(values: Any) -> bool:
     return isinstance(values, np.ndarray) and values.base is _NAN
 
 
-def same_bits(some: AnyArray, others: AnyArray) -> bool:
+def has_same_bits(some: AnyArray, others: AnyArray) -> bool:
     """Return whether two columns are the same, NaN and the sign of 0 too; differing ends tell."""
     if some.dtype != others.dtype or len(some) != len(others):
         return False
@@ -106,7 +106,7 @@ def constant(value: Any, rows: int, kind: Any) -> AnyArray:
     return column
 
 
-def of_one_value(values: AnyArray) -> bool:
+def is_constant(values: AnyArray) -> bool:
     """Return whether a column is known to hold the same in all rows, without a look at them."""
     return not values.strides[0]
 
@@ -116,7 +116,7 @@ def one_row(values: AnyArray) -> AnyArray:
     return values if values.strides[0] else values[:1]
 
 
-def seen_once(values: AnyArray) -> AnyArray:
+def constant_if_equal(values: AnyArray) -> AnyArray:
     """Return a column that holds the same in all of many rows as `constant`; others as they are."""
     if len(values) < _MANY:
         return values
@@ -124,9 +124,9 @@ def seen_once(values: AnyArray) -> AnyArray:
     return constant(values[0], len(values), values.dtype) if same else values
 
 
-def picked(values: AnyArray, rows: IntArray) -> AnyArray:
+def take_rows(values: AnyArray, rows: IntArray) -> AnyArray:
     """Return some rows of a column; of one that is constant, without a look at them."""
-    if len(values) and of_one_value(values):
+    if len(values) and is_constant(values):
         if len(rows) <= len(values):  # a part of it is made in no time
             return values[: len(rows)]
         return constant(values[0], len(rows), values.dtype)

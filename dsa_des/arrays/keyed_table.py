@@ -30,7 +30,7 @@ class KeyedTable:
         return self.__dict__
 
     @classmethod
-    def of_columns(cls, columns: dict[str, Any]) -> Self:
+    def from_columns(cls, columns: dict[str, Any]) -> Self:
         """Return a table of a dict of columns, which it keeps."""
         table = object.__new__(cls)
         table.__dict__ = columns
@@ -42,7 +42,7 @@ class KeyedTable:
     ) -> Self:
         """Return no things, of columns of some types; `shapes` are those before the last axis."""
         shapes = shapes or {}
-        return cls.of_columns(
+        return cls.from_columns(
             {n: np.empty((*shapes.get(n, ()), 0), dtype=t) for n, t in types.items()}
         )
 
@@ -53,56 +53,56 @@ class KeyedTable:
                 return self
             which = which.nonzero()[0]
         if len(which) == 0:
-            return self.of_columns({name: v[..., :0] for name, v in self.__dict__.items()})
-        return self.of_columns({name: v.take(which, -1) for name, v in self.__dict__.items()})
+            return self.from_columns({name: v[..., :0] for name, v in self.__dict__.items()})
+        return self.from_columns({name: v.take(which, -1) for name, v in self.__dict__.items()})
 
     def with_columns(self, **columns: Any) -> Self:
         """Return the same things with other values."""
-        return self.of_columns({**self.__dict__, **columns})
+        return self.from_columns({**self.__dict__, **columns})
 
     @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
+    def concatenate(cls, parts: Sequence[Self]) -> Self:
         """Return the things of all parts, one after the other."""
         filled = [part for part in parts if len(part)] or [parts[0]]
         if len(filled) == 1:
             return filled[0]
         names = filled[0].columns
-        return cls.of_columns(
+        return cls.from_columns(
             {n: np.concatenate([p.columns[n] for p in filled], axis=-1) for n in names}
         )
 
-    def in_order(self) -> Self:
-        """Return them by run, and in their order in it."""
+    def sort(self) -> Self:
+        """Return the rows sorted by run, stably."""
         if bool((self.replica[1:] >= self.replica[:-1]).all()):
             return self
         return self.take(np.argsort(self.replica, kind="stable"))
 
-    def _only_of(self, runs: IntArray) -> bool:
+    def _is_one_run(self, runs: IntArray) -> bool:
         """Whether all, which is in order, is of one run, the only one of some: the usual case."""
         replica = self.replica
         return bool(len(replica) and replica[0] == replica[-1] == runs[0] == runs[-1])
 
-    def of(self, runs: IntArray) -> Self:
-        """Return what there is of some runs, which are in order."""
-        if len(self) == 0 or self._only_of(runs):
+    def rows_of_runs(self, runs: IntArray) -> Self:
+        """Return the rows of some runs, which are in order."""
+        if len(self) == 0 or self._is_one_run(runs):
             return self
         return self.take(np.isin(self.replica, runs))
 
-    def after(self, runs: IntArray, newer: Self, first_run: int) -> Self:
-        """Return `newer` of some runs, and what there is of others but those before the first."""
-        if len(self) == 0 or self._only_of(runs):
-            return newer.in_order()
+    def replace_runs(self, runs: IntArray, newer: Self, first_run: int) -> Self:
+        """Replace the rows of some runs by `newer`; drop runs before the first."""
+        if len(self) == 0 or self._is_one_run(runs):
+            return newer.sort()
         others = (self.replica >= first_run) & ~np.isin(self.replica, runs)
-        return self.joined([self.take(others), newer]).in_order()
+        return self.concatenate([self.take(others), newer]).sort()
 
-    def continued(self, new: Self) -> Self:
-        """Return the row of each run of `new`, as it is there where this holds none."""
-        old = self.of(new.replica)
+    def latest_or_new(self, new: Self) -> Self:
+        """Return each run's row: this table's, or the row of `new` where this has none."""
+        old = self.rows_of_runs(new.replica)
         here = np.searchsorted(new.replica, old.replica)
         columns = {name: values.copy() for name, values in new.columns.items()}
         for name, values in columns.items():
             values[..., here] = old.columns[name]
-        return self.of_columns(columns)
+        return self.from_columns(columns)
 
 
 def turns(keys: IntArray) -> list[IntArray]:

@@ -27,20 +27,20 @@ _MANY = 64
 _LEAST_BITS = 44
 
 
-def no_runs(rows: int) -> IntArray:
+def runs_of_single(rows: int) -> IntArray:
     """Return the runs of rows of a single run: 0, seen `rows` times."""
     return _ZEROS[:rows]
 
 
-def says_no_runs(run: IntArray) -> bool:
-    """Return whether runs come from `no_runs`."""
+def is_single_run(run: IntArray) -> bool:
+    """Return whether runs come from `runs_of_single`."""
     return run.base is _ZERO
 
 
-def joined_runs(parts: Sequence[IntArray]) -> IntArray:
+def concatenate_runs(parts: Sequence[IntArray]) -> IntArray:
     """Return the runs of the rows of all parts, one after the other."""
     if all(part.base is _ZERO for part in parts):
-        return no_runs(sum(map(len, parts)))
+        return runs_of_single(sum(map(len, parts)))
     return np.concatenate(parts)
 
 
@@ -66,23 +66,23 @@ class RunTicks:
         return len(self.tick)
 
     @classmethod
-    def none(cls) -> "RunTicks":
-        """Return no instants."""
-        return cls(no_runs(0), np.empty(0, dtype=np.int64))
+    def empty(cls) -> "RunTicks":
+        """Return an empty set of instants."""
+        return cls(runs_of_single(0), np.empty(0, dtype=np.int64))
 
     @classmethod
     def of_run(cls, run: int, tick: IntArray) -> "RunTicks":
         """Return instants of one run."""
-        runs = no_runs(len(tick)) if run == 0 else np.full(len(tick), run, dtype=np.int64)
+        runs = runs_of_single(len(tick)) if run == 0 else np.full(len(tick), run, dtype=np.int64)
         return cls(runs, tick)
 
     @classmethod
-    def joined(cls, parts: Sequence["RunTicks"]) -> "RunTicks":
+    def concatenate(cls, parts: Sequence["RunTicks"]) -> "RunTicks":
         """Return the instants of all parts, one after the other, in whatever order that is."""
         if len(parts) == 1:
             return parts[0]
         ticks = np.concatenate([part.tick for part in parts])
-        return cls(joined_runs([part.run for part in parts]), ticks)
+        return cls(concatenate_runs([part.run for part in parts]), ticks)
 
     def take(self, rows: slice | IntArray | BoolArray) -> "RunTicks":
         """Return some of them."""
@@ -91,10 +91,14 @@ class RunTicks:
             if rows.indices(count) == (0, count, 1):
                 return self
         tick = self.tick[rows]
-        return RunTicks(no_runs(len(tick)) if says_no_runs(self.run) else self.run[rows], tick)
+        return RunTicks(
+            runs_of_single(len(tick)) if is_single_run(self.run) else self.run[rows], tick
+        )
 
     def part(self, rows: IntArray) -> "RunTicks":
-        """Return some of them, ascending, and remember where they are; none stands here twice."""
+        """Return some of the instants, ascending, and remember their positions; there are no
+        duplicates.
+        """
         some = self.take(rows)
         self._parts.append((some, rows))
         return some
@@ -103,20 +107,20 @@ class RunTicks:
         """Return instants of the same runs so much later."""
         return RunTicks(self.run, self.tick + ticks)
 
-    def at_most(self, end: int) -> int:
+    def count_before_end(self, end: int) -> int:
         """Return how many there are before a tick, where all are of one run."""
         return len(self.tick) if self.tick[-1] < end else int(self.tick.searchsorted(end))
 
     @property
-    def one_run(self) -> bool:
+    def is_one_run(self) -> bool:
         """Whether all, which are in order, are of one run."""
         run = self.run
-        return says_no_runs(run) or len(run) == 0 or bool(run[0] == run[-1])
+        return is_single_run(run) or len(run) == 0 or bool(run[0] == run[-1])
 
     @property
     def last_of_each(self) -> IntArray:
         """The position of the last instant of each run."""
-        if len(self) == 0 or self.one_run:
+        if len(self) == 0 or self.is_one_run:
             return np.arange(len(self))[-1:]
         # A search for each run: they are far fewer than the instants.
         numbers = np.arange(self.run[0], self.run[-1] + 1)
@@ -126,7 +130,7 @@ class RunTicks:
     @property
     def first_of_each(self) -> IntArray:
         """The position of the first instant of each run."""
-        if len(self) == 0 or self.one_run:
+        if len(self) == 0 or self.is_one_run:
             return np.zeros(min(1, len(self)), dtype=np.int64)
         return np.append(0, self.last_of_each[:-1] + 1)
 
@@ -141,7 +145,7 @@ class RunTicks:
 
     def newest(self) -> "RunTicks":
         """Return for each the latest instant so far of its run; ticks need be in no order."""
-        if self.one_run:
+        if self.is_one_run:
             return RunTicks(self.run, np.maximum.accumulate(self.tick))
         # As one number, a tick of a later run is larger than all of the runs before.
         first, span = int(self.tick.min()), int(self.tick.max()) - int(self.tick.min()) + 1
@@ -153,15 +157,15 @@ class RunTicks:
         parts = np.split(self.tick, self.first_of_each[1:])
         return RunTicks(self.run, np.concatenate([np.maximum.accumulate(p) for p in parts]))
 
-    def before(self, run: int, tick: int) -> int:
-        """Return how many lie before a tick of a run."""
-        if says_no_runs(self.run):
+    def count_before(self, run: int, tick: int) -> int:
+        """Return the number of instants before a tick of a run."""
+        if is_single_run(self.run):
             return len(self) if run > 0 else int(np.searchsorted(self.tick, tick))
         first, last = np.searchsorted(self.run, [run, run + 1]).tolist()
         return int(first + np.searchsorted(self.tick[first:last], tick))
 
 
-def _one_run(parts: Sequence[RunTicks]) -> bool:
+def _is_same_run(parts: Sequence[RunTicks]) -> bool:
     """Whether all parts, which are in order, are of the same run."""
     for part in parts:
         if part.run.base is not _ZERO:
@@ -178,7 +182,7 @@ def _keys(*parts: RunTicks) -> tuple[list[IntArray], int]:
     Instants may be in no order. Where runs and ticks do not go into one number, ranks of the ticks
     do, and there are -1 bits.
     """
-    if all(says_no_runs(part.run) for part in parts):
+    if all(is_single_run(part.run) for part in parts):
         return [part.tick for part in parts], -1
     extents = [_extent(part) for part in parts]
     bits = max(_LEAST_BITS, max(most.bit_length() for most, _ in extents) + 1)
@@ -217,7 +221,7 @@ def union(parts: Sequence[RunTicks]) -> RunTicks:
     for put_together, known in _unions:
         if put_together == set(parts):  # the same objects
             return known
-    if _one_run(parts):
+    if _is_same_run(parts):
         ticks, positions = sorted_union([part.tick for part in parts])
         run = next((int(part.run[0]) for part in parts if len(part)), 0)
         instants = RunTicks.of_run(run, ticks)
@@ -227,7 +231,7 @@ def union(parts: Sequence[RunTicks]) -> RunTicks:
         if bits < 0:
             rows = np.empty(len(every), dtype=np.int64)
             rows[np.concatenate(positions)] = np.arange(sum(map(len, parts)))
-            instants = RunTicks.joined(parts).take(rows)
+            instants = RunTicks.concatenate(parts).take(rows)
         else:
             runs = (every + (1 << (bits - 1))) >> bits
             instants = RunTicks(runs, every - (runs << bits))
@@ -261,7 +265,7 @@ def _last_of_run(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
         return np.arange(count), True
     if (known := _positions(instants, asked)) is not None:
         return known, True
-    one_run = _one_run((instants, asked))
+    one_run = _is_same_run((instants, asked))
     known_keys, keys = (instants.tick, asked.tick) if one_run else _keys(instants, asked)[0]
     # As for blocks that run at the same instants; a search would take a tenth of a whole run.
     same = there == count >= _MANY and bool((known_keys == keys).all())
@@ -297,7 +301,7 @@ def next_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
 
     Where its run has none so late it is the position behind the run's last one.
     """
-    if _one_run((instants, asked)):
+    if _is_same_run((instants, asked)):
         return instants.tick.searchsorted(asked.tick)
     keys, _ = _keys(instants, asked)
     return keys[0].searchsorted(keys[1])

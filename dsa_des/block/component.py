@@ -17,7 +17,7 @@ from dsa_des.block.parameters import PositiveRational as PositiveRational
 from dsa_des.block.parameters import Rational as Rational
 from dsa_des.block.parameters import ScenePath as ScenePath
 from dsa_des.block.parameters import SourcedText as SourcedText
-from dsa_des.block.parameters import as_written as as_written
+from dsa_des.block.parameters import scene_number as scene_number
 from dsa_des.block.ports import Consumer as Consumer
 from dsa_des.block.ports import Input as Input
 from dsa_des.block.ports import Output as Output
@@ -136,7 +136,7 @@ class Component:
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         for said, unsaid in (("lockstep", False), ("remembers", None)):
-            if said not in vars(cls) and not _speaks_for(cls, said):
+            if said not in vars(cls) and not _is_same_package(cls, said):
                 setattr(cls, said, unsaid)
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
@@ -259,7 +259,7 @@ class Component:
         return []
 
     def built(self, acts_on: Hook[Built]) -> list[Built]:
-        """Return what was built of the effects that act on a quantity, in declared order.
+        """Return the built parts of the effects that act on a quantity, in declared order.
 
         Raises
         ------
@@ -325,7 +325,7 @@ class Component:
         return f"{cls.__module__}:{cls.__qualname__}"
 
 
-def _speaks_for(cls: type[Component], said: str) -> bool:
+def _is_same_package(cls: type[Component], said: str) -> bool:
     """Whether the base that last said something of its code is of the same package."""
     base = next(base for base in cls.__mro__ if said in vars(base))
     return base.__module__.partition(".")[0] == cls.__module__.partition(".")[0]

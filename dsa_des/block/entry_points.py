@@ -8,7 +8,7 @@ COMPONENTS = "dsa_des.components"
 
 
 @lru_cache(maxsize=16)
-def registered(group: str = COMPONENTS) -> dict[str, EntryPoint]:
+def entry_points_of(group: str = COMPONENTS) -> dict[str, EntryPoint]:
     """Return the entry points of a group by name, sorted."""
     found = {point.name: point for point in entry_points(group=group)}
     return dict(sorted(found.items()))

@@ -17,11 +17,11 @@ from dsa_des.block import source_file
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.block.source_file import (
     file_of,
+    find_other_module,
+    folders_for_module,
     last_on_path,
-    needed,
-    other_of_the_name,
     remember,
-    searched,
+    search_folders,
 )
 from dsa_des.errors import UsageError, did_you_mean
 
@@ -29,7 +29,7 @@ from dsa_des.errors import UsageError, did_you_mean
 _HOME = Path(__file__).parents[2]
 
 
-def refuse_hidden(module_name: str) -> None:
+def refuse_hidden_module(module_name: str) -> None:
     """Raise UsageError if a module of ours, by name, would be imported from another package."""
     top = module_name.partition(".")[0]
     ours = _HOME / top
@@ -131,16 +131,18 @@ def load_named(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
         file = file_of(module_name, beside) if path is None else str(path)
         short = module_name if path is None else path.stem
         policy.about_to(Foreign(key, name, short, file))
-    module = _imported(module_name, beside) if path is None else _imported_file(path)
+    module = _import_module(module_name, beside) if path is None else _import_file(path)
     try:
         with foreign_code():
             return getattr(module, class_name)
     except ForeignFailure as error:
         if not isinstance(error.__cause__, AttributeError):
-            raise NotImportable(f"{_where(module)} cannot give {class_name!r}: {error}") from error
+            raise NotImportable(
+                f"{_location_of(module)} cannot give {class_name!r}: {error}"
+            ) from error
         known = [n for n in vars(module) if not n.startswith("_")]
         hint = did_you_mean(class_name, known)
-        raise NotImportable(f"{_where(module)} has no {class_name!r}{hint}") from None
+        raise NotImportable(f"{_location_of(module)} has no {class_name!r}{hint}") from None
 
 
 def load_point(point: EntryPoint, key: str = "") -> Any:
@@ -150,20 +152,20 @@ def load_point(point: EntryPoint, key: str = "") -> Any:
     hides it.
     """
     if is_ours(point):
-        refuse_hidden(point.module)
+        refuse_hidden_module(point.module)
     elif key:
         policy = _IMPORTS.get()
         if policy.announce is not None or not policy.allowed:
             policy.about_to(Foreign(key, point.name, point.module, file_of(point.module)))
     try:
-        with foreign_code(), _no_output(point.module):
+        with foreign_code(), _redirect_output(point.module):
             return point.load()
     except ForeignFailure as error:
         what = f"cannot be imported from {point.value} ({file_of(point.module)}): {error}"
         raise NotImportable(what) from error.__cause__
 
 
-def installed(point: EntryPoint) -> Any:
+def load_installed(point: EntryPoint) -> Any:
     """Return what a package registered that no file names: a section, a report, a command.
 
     UsageError if it cannot be imported.
@@ -187,44 +189,44 @@ def _name_of(distribution: Distribution) -> str:
     return distribution.name.lower().replace("_", "-")
 
 
-def _imported(module_name: str, beside: Sequence[Path]) -> Any:
+def _import_module(module_name: str, beside: Sequence[Path]) -> Any:
     top = module_name.partition(".")[0]
-    folders = searched(beside)
-    if others := other_of_the_name(top, folders):
+    folders = search_folders(beside)
+    if others := find_other_module(top, folders):
         raise NotImportable(
             f"module {top!r} was imported from {others[0]} before, which {others[1]} is not: "
             "name that ./FILE.py:CLASS"
         )
-    extra = needed(top, folders)
+    extra = folders_for_module(top, folders)
     try:
-        with last_on_path(extra), foreign_code(), _no_output(module_name):
+        with last_on_path(extra), foreign_code(), _redirect_output(module_name):
             module = importlib.import_module(module_name)
     except ForeignFailure as error:
-        raise NotImportable(_why(module_name, beside, error)) from error.__cause__
+        raise NotImportable(_explain_failure(module_name, beside, error)) from error.__cause__
     remember(top, extra)
     return module
 
 
-def _imported_file(path: Path) -> Any:
+def _import_file(path: Path) -> Any:
     if what := source_file.missing(path):
         raise NotImportable(what)
     try:
-        with foreign_code(), _no_output(path.name):
-            return source_file.imported(path)
+        with foreign_code(), _redirect_output(path.name):
+            return source_file.import_file(path)
     except ForeignFailure as error:
         left = "it left with " if isinstance(error.__cause__, SystemExit) else ""
         raise NotImportable(f"{path} cannot be imported: {left}{error}") from error.__cause__
 
 
-def _why(module_name: str, beside: Sequence[Path], error: ForeignFailure) -> str:
+def _explain_failure(module_name: str, beside: Sequence[Path], error: ForeignFailure) -> str:
     cause, file = error.__cause__, file_of(module_name, beside)
     missing = (cause.name or "") if isinstance(cause, ModuleNotFoundError) else ""
     if missing and (module_name == missing or module_name.startswith(f"{missing}.")):
-        others = [folder for folder in searched(beside)[1:] if Path(folder).is_dir()]
+        others = [folder for folder in search_folders(beside)[1:] if Path(folder).is_dir()]
         return (
             f"there is no module {module_name!r} in the working directory"
             f"{''.join(f', in {folder}' for folder in others)} or on the Python path"
-            f"{_shadowed(module_name)}"
+            f"{_describe_shadowed(module_name)}"
         )
     if isinstance(cause, SystemExit):
         return (
@@ -236,7 +238,7 @@ def _why(module_name: str, beside: Sequence[Path], error: ForeignFailure) -> str
     return f"module {module_name!r} ({file}) cannot be imported: {error}"
 
 
-def _shadowed(module_name: str) -> str:
+def _describe_shadowed(module_name: str) -> str:
     """Say which installed package of the same name was looked in instead of a folder here."""
     top, *rest = module_name.split(".")
     here = Path.cwd() / top
@@ -246,7 +248,7 @@ def _shadowed(module_name: str) -> str:
     return f": {top} is the installed {found}, not the folder {here}; give that another name"
 
 
-def _where(module: Any) -> str:
+def _location_of(module: Any) -> str:
     file = getattr(module, "__file__", None)
     if file == module.__name__:
         return str(file)
@@ -280,7 +282,7 @@ class _Shown(io.TextIOBase):
 
 
 @contextlib.contextmanager
-def _no_output(module_name: str) -> Iterator[None]:
+def _redirect_output(module_name: str) -> Iterator[None]:
     """Keep what is printed meanwhile off standard output, which may be JSON."""
     shown = _Shown(module_name)
     try:

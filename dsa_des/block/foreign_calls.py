@@ -14,7 +14,7 @@ from typing import Any
 from dsa_des.terminal.interruption import Terminated
 
 
-def must_pass(error: BaseException) -> bool:
+def is_stop_request(error: BaseException) -> bool:
     """Return whether an exception is no stranger's error but means that we have to stop.
 
     Ctrl-C, and whatever this package raises itself to leave (in a handler of a signal, say).
@@ -23,10 +23,10 @@ def must_pass(error: BaseException) -> bool:
         return False
     if isinstance(error, KeyboardInterrupt | GeneratorExit):
         return True
-    return raised_in(error.__traceback__).startswith("dsa_des.")
+    return module_of_error(error.__traceback__).startswith("dsa_des.")
 
 
-def raised_in(trace: TracebackType | None) -> str:
+def module_of_error(trace: TracebackType | None) -> str:
     """Return the name of the module in which an exception was raised."""
     name = ""
     while trace is not None:
@@ -40,7 +40,7 @@ def raised_in(trace: TracebackType | None) -> str:
 REFUSALS = (ValueError, OSError, ArithmeticError, MemoryError)
 
 
-def why_refused(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """Return what an exception says, with its kind where its text alone says little."""
     if isinstance(error, ArithmeticError):
         return f"its numbers are too large or too small to be computed with ({error})"
@@ -99,7 +99,7 @@ def foreign_code(*expected: type[Exception]) -> Iterator[None]:
             pressed = isinstance(error, KeyboardInterrupt) and interrupted()
             if pressed or isinstance(error, GeneratorExit):
                 raise
-            if not isinstance(error, KeyboardInterrupt) and must_pass(error):
+            if not isinstance(error, KeyboardInterrupt) and is_stop_request(error):
                 raise
             raise ForeignFailure(error_text(error)) from error
 

@@ -43,10 +43,12 @@ _FURTHER = ("d", "<", ">", "8", "*")
 def marks_of(classes: Mapping[str, type | None]) -> dict[str, Mark]:
     """Return name → mark, of blocks in order of their names; None for a name that is no block."""
     own = {name: getattr(cls, "mark", None) for name, cls in classes.items()}
-    return told_apart({n: mark if isinstance(mark, Mark) else None for n, mark in own.items()})
+    return distinguish_marks(
+        {n: mark if isinstance(mark, Mark) else None for n, mark in own.items()}
+    )
 
 
-def told_apart(kinds: Mapping[str, Mark | None]) -> dict[str, Mark]:
+def distinguish_marks(kinds: Mapping[str, Mark | None]) -> dict[str, Mark]:
     """Return name → mark, in order of the names: of one kind the same colour, other markers."""
     found: dict[str, Mark] = {}
     before: dict[Mark, int] = {}

@@ -11,9 +11,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from dsa_des.arrays.column_values import Columns, Text, nothing_in
+from dsa_des.arrays.column_values import Columns, Text, null_column
 from dsa_des.arrays.entries import entries_of, offsets_of, row_of_entries
-from dsa_des.arrays.run_ticks import RunTicks, joined_runs, no_runs, says_no_runs
+from dsa_des.arrays.run_ticks import RunTicks, concatenate_runs, is_single_run, runs_of_single
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.recorded_columns import (
     PER_ENTRY,
@@ -41,7 +41,7 @@ __all__ = [
     "column",
     "columns",
     "columns_of",
-    "derived",
+    "derive_columns",
     "instants_of",
     "offsets_of",
     "per_entry",
@@ -79,7 +79,7 @@ def rows_of(columns: Columns, rows: slice) -> Columns:
     }
 
 
-def derived(message_type: type) -> DerivedColumns:
+def derive_columns(message_type: type) -> DerivedColumns:
     """Return what a message class records by its fields."""
     if message_type not in _DERIVED:
         _DERIVED[message_type] = DerivedColumns(message_type, Message)
@@ -91,7 +91,7 @@ class _DerivedRecorded:
 
     def __get__(self, message: Any, owner: type) -> Mapping[str, Mapping[str, Column]]:
         # `dataclass` asks for it while it makes `Message` itself.
-        return derived(owner).recorded if is_dataclass(owner) else {}
+        return derive_columns(owner).recorded if is_dataclass(owner) else {}
 
 
 class _Found:
@@ -142,10 +142,10 @@ class Message(_Found):
     def __post_init__(self) -> None:
         """Let columns of entries that were not given be null, and whole numbers 0."""
         self.run = self._runs()
-        for name, kind in derived(type(self)).optional.items():
+        for name, kind in derive_columns(type(self)).optional.items():
             if getattr(self, name) is None:
                 count = int(self.offsets[-1])  # type: ignore[attr-defined]
-                none = nothing_in(count) if kind == "float64" else np.zeros(count, np.int64)
+                none = null_column(count) if kind == "float64" else np.zeros(count, np.int64)
                 setattr(self, name, none)
 
     def __len__(self) -> int:
@@ -159,7 +159,7 @@ class Message(_Found):
 
     def _runs(self) -> IntArray:
         """Return of which run each row is, also where a class has a `__post_init__` of its own."""
-        return no_runs(len(self.tick)) if self.run is None else self.run
+        return runs_of_single(len(self.tick)) if self.run is None else self.run
 
     @property
     def instants(self) -> RunTicks:
@@ -197,7 +197,7 @@ class Message(_Found):
     def empty(cls, **others: Any) -> Self:
         """Return a message of one row, at tick 0, without entries, with `others` as fields."""
         start, none = np.zeros(1, dtype=np.int64), np.zeros(2, dtype=np.int64)
-        return cls(tick=start, **{"offsets": none, **derived(cls).empty(), **others})
+        return cls(tick=start, **{"offsets": none, **derive_columns(cls).empty(), **others})
 
     def check(self) -> None:
         """Refuse fields whose first axis is not that of the rows, or of the entries.
@@ -213,19 +213,21 @@ class Message(_Found):
         rows, (row_names, entry_names, _) = len(self.tick), _layout(type(self))
         self.run = self._runs()
         if len(self.run) != rows:
-            raise ValueError(f"{_of(self, 'run')} has {len(self.run)} of {rows} rows")
+            raise ValueError(f"{_describe_field(self, 'run')} has {len(self.run)} of {rows} rows")
         _check_each(self, row_names, rows, "rows")
         offsets = getattr(self, "offsets", None)
         if offsets is None:
             return
         if not isinstance(offsets, np.ndarray) or offsets.dtype.kind not in "iu":
-            raise TypeError(f"{_of(self, 'offsets')} is {_kind(offsets)}: whole numbers are needed")
+            raise TypeError(
+                f"{_describe_field(self, 'offsets')} is {_kind(offsets)}: whole numbers are needed"
+            )
         if offsets.shape != (rows + 1,) or (
             rows > 1 and np.count_nonzero(offsets[1:] < offsets[:-1])
         ):
             raise ValueError(
-                f"{_of(self, 'offsets')} of shape {offsets.shape} must be ascending, one more than "
-                f"the {rows} rows"
+                f"{_describe_field(self, 'offsets')} of shape {offsets.shape} must be ascending, "
+                f"one more than the {rows} rows"
             )
         _check_each(self, entry_names, int(offsets[-1]) - int(offsets[0]), "entries")
 
@@ -243,14 +245,14 @@ class Message(_Found):
         for name in row_names:
             values[name] = _pick(values[name], rows)
         run = self._runs()
-        result.run = no_runs(len(result.tick)) if says_no_runs(run) else run[rows]
+        result.run = runs_of_single(len(result.tick)) if is_single_run(run) else run[rows]
         if entry_names or "offsets" in values:
             values["offsets"], index = entries_of(values["offsets"], rows)
             for name in entry_names:
                 values[name] = _pick(values[name], index)
         return result
 
-    def reordered(self, order: IntArray) -> Self:
+    def reorder(self, order: IntArray) -> Self:
         """Return the message with its entries in another order, each still of its row."""
         result = self._copy()
         for name in _layout(type(self))[1]:
@@ -267,7 +269,7 @@ class Message(_Found):
         result.run = run
         return result
 
-    def alike(self, other: "Message") -> bool:
+    def is_alike(self, other: "Message") -> bool:
         """Return whether another message differs in nothing but its rows and their values."""
         if self.__class__ is not other.__class__:
             return False
@@ -286,7 +288,7 @@ class Message(_Found):
 
         Every table has a column ``tick``, in order; by default what the fields declare.
         """
-        return derived(type(self)).tables(self)
+        return derive_columns(type(self)).tables(self)
 
     def frozen(self, of: Self, source: IntArray, later_s: FloatArray) -> Self:
         """Return its rows with the entries of rows of another message, as if they were new.
@@ -296,7 +298,7 @@ class Message(_Found):
         """
         offsets, index = entries_of(of.offsets, np.maximum(source, 0))  # type: ignore[attr-defined]
         there = np.repeat(source >= 0, np.diff(offsets))
-        result = of.reordered(np.asarray(index)[there])
+        result = of.reorder(np.asarray(index)[there])
         for name in (*_layout(type(self))[0], *_layout(type(self))[2]):
             setattr(result, name, getattr(self, name))
         result.run = self._runs()
@@ -323,7 +325,7 @@ class Message(_Found):
         rows = [len(part) for part in parts]
         for name in row_names:
             setattr(result, name, _join([*map(attrgetter(name), parts)], rows))
-        result.run = joined_runs([part._runs() for part in parts])
+        result.run = concatenate_runs([part._runs() for part in parts])
         if entry_names or hasattr(result, "offsets"):
             offsets = [part.offsets for part in parts]  # type: ignore[attr-defined]
             starts = np.cumsum([0] + [int(o[-1] - o[0]) for o in offsets])
@@ -351,7 +353,7 @@ class Message(_Found):
         raise ValueError(f"{cls.__name__} cannot be written in a scene; allowed: 'nothing'")
 
 
-def _of(message: Message, name: str) -> str:
+def _describe_field(message: Message, name: str) -> str:
     return f"{type(message).__qualname__}.{name}"
 
 
@@ -380,7 +382,7 @@ def _check_each(message: Message, names: tuple[str, ...], count: int, what: str)
 
 def _refuse(message: Message, name: str, value: Any, count: int, what: str) -> None:
     """Raise unless it is an array of another class that will do, such as a masked one."""
-    said = f"{_of(message, name)} is {_kind(value)}"
+    said = f"{_describe_field(message, name)} is {_kind(value)}"
     if not isinstance(value, np.ndarray):
         raise TypeError(f"{said}: an array of {count} {what} is needed")
     if value.ndim == 0 or len(value) != count:

@@ -20,7 +20,7 @@ from pydantic import (
     field_validator,
 )
 
-from dsa_des.block.shipped_files import found_or_shipped
+from dsa_des.block.shipped_files import resolve_shipped
 from dsa_des.files.input_files import resolve_home
 from dsa_des.time.clock import MOST_JITTER, ClockSpec, parse_rational
 
@@ -75,24 +75,24 @@ def refuse_extremes(name: str, value: Any) -> None:
             refuse_extremes(name, item)
 
 
-def as_written(value: Fraction) -> int | float | str:
+def scene_number(value: Fraction) -> int | float | str:
     """Return an exact number the way a scene would hold it."""
     if value.denominator == 1:
         return int(value)
     return float(value) if Fraction(repr(float(value))) == value else str(value)
 
 
-def _in_words(value: Any) -> str:
+def _describe_value(value: Any) -> str:
     """Return a parameter's value as a sentence holds it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):
         return f"{value:g}"
-    return str(as_written(value)) if isinstance(value, Fraction) else repr(value)
+    return str(scene_number(value)) if isinstance(value, Fraction) else repr(value)
 
 
 #: An exact rate or time: a number or text such as "30000/1001".
-Rational = Annotated[Fraction, BeforeValidator(parse_rational), PlainSerializer(as_written)]
+Rational = Annotated[Fraction, BeforeValidator(parse_rational), PlainSerializer(scene_number)]
 PositiveRational = Annotated[Rational, Field(gt=0)]
 NonNegativeRational = Annotated[Rational, Field(ge=0)]
 
@@ -104,7 +104,7 @@ class SourcedText(str):
     folder: Path
 
     @classmethod
-    def of(cls, text: str, folder: Path) -> "SourcedText":
+    def from_text(cls, text: str, folder: Path) -> "SourcedText":
         """Return `text` as written in a file of `folder`."""
         result = cls(text)
         result.folder = folder
@@ -116,18 +116,18 @@ def _resolve_path(value: object) -> Path:
         raise ValueError("must be a path, as text")
     path = resolve_home(str(value))
     if isinstance(value, SourcedText) and not path.is_absolute():
-        path = found_or_shipped(value.folder / path, str(value))
+        path = resolve_shipped(value.folder / path, str(value))
     return path
 
 
-def _whole_path(path: Path) -> str:
+def _resolve_path_text(path: Path) -> str:
     # A run's own scene.toml lies elsewhere: what it names must be found from there too.
     return os.path.abspath(path)
 
 
 #: A path; a relative one is taken from the folder of the file that holds the key. Written out, it
 #: is whole.
-ScenePath = Annotated[Path, BeforeValidator(_resolve_path), PlainSerializer(_whole_path)]
+ScenePath = Annotated[Path, BeforeValidator(_resolve_path), PlainSerializer(_resolve_path_text)]
 
 
 class Parameters(BaseModel):
@@ -160,7 +160,7 @@ class Parameters(BaseModel):
         """Say which keys without effect, `because` of another one, are not at their defaults."""
         fields = type(self).model_fields
         return [
-            f"{key} is {_in_words(getattr(self, key))}: it has no effect, {because}"
+            f"{key} is {_describe_value(getattr(self, key))}: it has no effect, {because}"
             for key in keys
             if getattr(self, key) != fields[key].default
         ]

@@ -40,7 +40,7 @@ class Input:
     between_platforms: bool = False
 
     @property
-    def held(self) -> bool:
+    def is_held(self) -> bool:
         """Whether the block sees the last message, rather than all that came since its last run."""
         return self.mode != "queued" and not self.many
 

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dsa_des.arrays.column_values import Columns, Instants, Text, picked
-from dsa_des.arrays.run_ticks import says_no_runs
+from dsa_des.arrays.column_values import Columns, Instants, Text, take_rows
+from dsa_des.arrays.run_ticks import is_single_run
 from dsa_des.arrays.types import IntArray
 
 # How a field of a message depends on its rows.
@@ -126,7 +126,7 @@ def column(
     ValueError
         If the column is of no kind that can be recorded.
     """
-    filled = {name: Column(unit, frame, meaning, _known(kind))}
+    filled = {name: Column(unit, frame, meaning, _check_kind(kind))}
     how = Filled(filled, False, value, in_entries, for_entries, instant)
     return field(metadata={"per": of, _RECORDED: how}, **kwargs)
 
@@ -149,7 +149,7 @@ def columns(
         As for `column`.
     """
     for one in recorded.values():
-        _known(one.kind)
+        _check_kind(one.kind)
     how = Filled(dict(recorded), True, value, False, for_entries)
     return field(metadata={"per": of, _RECORDED: how}, **kwargs)
 
@@ -163,7 +163,7 @@ def columns_of(group: type) -> dict[str, Column]:
     return found
 
 
-def _known(kind: str) -> str:
+def _check_kind(kind: str) -> str:
     if kind not in _KINDS:
         raise ValueError(f"column is {kind!r}: it must be one of {', '.join(_KINDS)}")
     return kind
@@ -176,11 +176,11 @@ _RECORDED = "recorded"
 def instants_of(message: Any, row: IntArray | None = None) -> Columns:
     """Return the columns that say when each row of a message is, or of which row each entry is."""
     columns: Columns = {"tick": message.tick}
-    if not says_no_runs(message.run):
+    if not is_single_run(message.run):
         columns["replica"] = message.run
     if row is None:
         return columns
-    return {name: picked(values, row) for name, values in columns.items()}  # type: ignore[arg-type]
+    return {name: take_rows(values, row) for name, values in columns.items()}  # type: ignore[arg-type]
 
 
 class DerivedColumns:
@@ -203,7 +203,7 @@ class DerivedColumns:
         self._row_table: str = message_type.row_table
         self._entry_table: str = message_type.entry_table
         self._fields = {item.name: item for item in fields(message_type)}
-        names = [name for name in _in_order(message_type, base) if name in self._fields]
+        names = [name for name in _fields_in_order(message_type, base) if name in self._fields]
         if not issubclass(message_type.__mro__[1], base):
             # What only some fill comes behind what the mix-ins have.
             names.sort(key=lambda name: _is_many(self._fields[name]))
@@ -257,14 +257,14 @@ class DerivedColumns:
         """
         tables: dict[str, Columns] = {}
         if self._rows:
-            tables[self._row_table] = self._filled(message, self._rows, instants_of(message))
+            tables[self._row_table] = self._fill_columns(message, self._rows, instants_of(message))
         if self._entries:
             row = message.row_of_entries
             made = instants_of(message, row)
-            tables[self._entry_table] = self._filled(message, self._entries, made, row)
+            tables[self._entry_table] = self._fill_columns(message, self._entries, made, row)
         return tables
 
-    def _filled(
+    def _fill_columns(
         self,
         message: Any,
         filled: list[tuple[str, Filled]],
@@ -282,7 +282,7 @@ class DerivedColumns:
             if how.instant:
                 values = Instants(values, getattr(message, "ticks_per_s", _NANOSECONDS))
             if how.in_entries and row is not None:
-                values = _of_entries(values, row)
+                values = _entries_of_rows(values, row)
             made[_names(name, how)[0]] = values
         for name, how in dicts:
             held = getattr(message, name) if how.value is None else how.value(message)
@@ -307,7 +307,7 @@ def _is_many(item: Any) -> bool:
     return how is not None and how.many and item.metadata["per"] == PER_ENTRY
 
 
-def _in_order(message_type: type, base: type) -> Iterator[str]:
+def _fields_in_order(message_type: type, base: type) -> Iterator[str]:
     """Yield the names of a class: those of messages, the oldest first, then its mix-ins'."""
     kinds = [kind for kind in message_type.__mro__ if hasattr(kind, "__dataclass_fields__")]
     messages = [kind for kind in reversed(kinds) if issubclass(kind, base)]
@@ -316,7 +316,7 @@ def _in_order(message_type: type, base: type) -> Iterator[str]:
     yield from dict.fromkeys(name for names in of_kinds for name in names)
 
 
-def _of_entries(values: Any, row: IntArray) -> Any:
+def _entries_of_rows(values: Any, row: IntArray) -> Any:
     if isinstance(values, Text):
         return Text(values.codes.take(row), values.names)
-    return picked(values, row)
+    return take_rows(values, row)

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.component import Component, Input, Output, Parameters, SourcedText
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.foreign import (
     NotAllowed,
     NotImportable,
-    installed,
     is_ours,
+    load_installed,
     load_named,
     load_point,
 )
@@ -27,7 +27,7 @@ SECTIONS = "dsa_des.sections"
 @lru_cache(maxsize=1)
 def section_models() -> dict[str, type[Parameters]]:
     """Return the registered section models by table name, sorted."""
-    return {name: installed(point) for name, point in registered(SECTIONS).items()}
+    return {name: load_installed(point) for name, point in entry_points_of(SECTIONS).items()}
 
 
 class ClassText(str):
@@ -46,7 +46,7 @@ def type_text(cls: type, group: str) -> str:
     Else as ``module:Class`` where any process can import it, and else as a `ClassText`.
     """
     path = f"{cls.__module__}:{cls.__qualname__}"
-    for name, point in registered(group).items():
+    for name, point in entry_points_of(group).items():
         if point.value == path:
             return name
     if _is_importable(cls):
@@ -67,9 +67,9 @@ def classes_in(value: Any) -> list[str]:
     return []
 
 
-def sourced(value: str, folder: Any) -> str:
+def add_source(value: str, folder: Any) -> str:
     """Return a text as written in a file of a folder; a class stays one."""
-    return value if isinstance(value, ClassText) else SourcedText.of(value, folder)
+    return value if isinstance(value, ClassText) else SourcedText.from_text(value, folder)
 
 
 def _is_importable(cls: type) -> bool:
@@ -111,13 +111,13 @@ def find(type_name: str, key: str = "", beside: Sequence[Path] = ()) -> type[Com
     it may not be imported, and UnknownType if it cannot be or is not a `Component`.
     """
     if isinstance(type_name, ClassText):
-        return _looked_at(type_name, type_name.cls)
-    point = registered().get(type_name)
+        return _check_component_class(type_name, type_name.cls)
+    point = entry_points_of().get(type_name)
     if point is None and ":" not in type_name:
         module, _, last = type_name.rpartition(".")
         if module and last[:1].isupper():  # as Python writes it
             raise UnknownType(f"unknown block type; did you mean '{module}:{last}' (module:Class)?")
-        hint = did_you_mean(type_name, registered())
+        hint = did_you_mean(type_name, entry_points_of())
         raise UnknownType(f"unknown block type{hint} (or module:Class)")
     try:
         found = load_named(type_name, key, beside) if point is None else load_point(point, key)
@@ -127,10 +127,10 @@ def find(type_name: str, key: str = "", beside: Sequence[Path] = ()) -> type[Com
         raise UnknownType(str(error)) from error.__cause__
     if point is not None and is_ours(point):
         return _component(found)
-    return _looked_at(type_name, found)
+    return _check_component_class(type_name, found)
 
 
-def _looked_at(type_name: str, found: Any) -> type[Component]:
+def _check_component_class(type_name: str, found: Any) -> type[Component]:
     """Return a stranger's class if it is a component."""
     try:
         with foreign_code(UnknownType):

@@ -9,8 +9,8 @@ import os
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
-from dsa_des.block.entry_points import registered
-from dsa_des.block.foreign import installed
+from dsa_des.block.entry_points import entry_points_of
+from dsa_des.block.foreign import load_installed
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
 from dsa_des.errors import UsageError
 
@@ -24,17 +24,17 @@ def folders() -> list[Path]:
     UsageError if one of them cannot be asked.
     """
     found = []
-    for point in registered(GROUP).values():
+    for point in entry_points_of(GROUP).values():
         try:
             with foreign_code(UsageError):
-                found.append(Path(installed(point)()))
+                found.append(Path(load_installed(point)()))
         except ForeignFailure as error:
             message = f"{GROUP}: {point.name} gives no folder: {error}"
             raise UsageError(message) from error.__cause__
     return [folder for folder in found if folder.is_dir()]
 
 
-def found_or_shipped(path: Path, name: str) -> Path:
+def resolve_shipped(path: Path, name: str) -> Path:
     """Return a path that exists, or else the shipped file that a name means, or else the path.
 
     The name is as it was written: ``alerting/do365b.conf``, or ``do365b.conf`` where only one is

@@ -21,7 +21,7 @@ _UNFINDABLE = (ImportError, AttributeError, TypeError, ValueError, OSError)
 _FOUND: dict[str, str] = {}
 
 
-def searched(beside: Iterable[Path] = ()) -> list[str]:
+def search_folders(beside: Iterable[Path] = ()) -> list[str]:
     """Return the folders looked in besides the module path, the working directory first."""
     return list(dict.fromkeys(str(Path.cwd() / folder) for folder in (Path(), *beside)))
 
@@ -43,8 +43,8 @@ def last_on_path(folders: Sequence[str]) -> Iterator[None]:
             sys.path.reverse()
 
 
-def needed(top: str, folders: Sequence[str]) -> Sequence[str]:
-    """Return the folders that a module may be found in: none if it is installed."""
+def folders_for_module(top: str, folders: Sequence[str]) -> Sequence[str]:
+    """Return the folders to search for a module: none if it is installed."""
     return folders if _FOUND.get(top) in folders or not is_installed(top) else ()
 
 
@@ -64,7 +64,7 @@ def remember(top: str, folders: Sequence[str]) -> None:
             return
 
 
-def other_of_the_name(top: str, folders: Sequence[str]) -> tuple[str, str] | None:
+def find_other_module(top: str, folders: Sequence[str]) -> tuple[str, str] | None:
     """Return the files of an imported module and of another of its name that is meant now.
 
     None if what was imported is meant.
@@ -84,7 +84,7 @@ def file_of(module_name: str, beside: Iterable[Path] = ()) -> str:
     Where there is none: ``there is no such module``, or the kind of module it is.
     """
     try:
-        spec = _spec(module_name, searched(beside))
+        spec = _spec(module_name, search_folders(beside))
     except _UNFINDABLE:
         spec = None
     if spec is None:
@@ -98,7 +98,7 @@ def file_of(module_name: str, beside: Iterable[Path] = ()) -> str:
 
 def _spec(module_name: str, folders: Sequence[str]) -> ModuleSpec | None:
     top, *rest = module_name.split(".")
-    with last_on_path(needed(top, folders)):
+    with last_on_path(folders_for_module(top, folders)):
         # Finds the module of a name without dots; nothing is imported.
         spec = importlib.util.find_spec(top) if top else None
     name = top
@@ -155,7 +155,7 @@ def missing(path: Path) -> str:
     return f"there is no file {path}" + (f"; did you mean {close}?" if close else "")
 
 
-def imported(path: Path) -> ModuleType:
+def import_file(path: Path) -> ModuleType:
     """Return the module of a file, imported once; its name is its path.
 
     What lies beside it can be imported by it.

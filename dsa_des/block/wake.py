@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks, positions_among, says_no_runs
+from dsa_des.arrays.run_ticks import RunTicks, is_single_run, positions_among
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message
 
@@ -207,12 +207,12 @@ def _with_runs(port: str, message: Message, ran: RunTicks) -> Message:
     """
     sent = message.tick
     if sent is ran.tick:
-        message = message if says_no_runs(ran.run) else copy(message)
+        message = message if is_single_run(ran.run) else copy(message)
         message.instants = ran  # with what is known of them
         return message
     if sent.dtype == np.int64:
-        if not says_no_runs(ran.run) and says_no_runs(message.run):
-            if ran.one_run:
+        if not is_single_run(ran.run) and is_single_run(message.run):
+            if ran.is_one_run:
                 message = message.of_runs(np.full(len(sent), ran.run[0], dtype=np.int64))
             elif np.array_equal(sent, ran.tick):
                 message = message.of_runs(ran.run)

@@ -10,14 +10,14 @@ from rich.table import Table
 from rich.text import Text
 
 from dsa_des.block.component import Component
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.ladder import Ladder
 from dsa_des.block.registry import UnknownType, find
 from dsa_des.block.shipped_files import folders
 from dsa_des.commands.parameters import Row, parameter_rows, scene_tables
 from dsa_des.errors import OutputError, UsageError, did_you_mean, nearest
-from dsa_des.files.output_file import unfinished
-from dsa_des.files.output_names import check_place, location_of, named, reason_of
+from dsa_des.files.output_file import temporary_folder
+from dsa_des.files.output_names import check_place, location_of, reason_of, user_path
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.examples import Example, examples
 from dsa_des.terminal import terminal
@@ -30,17 +30,17 @@ _PARAMETER_HEADS = ("  name", "type", "unit", "default", "meaning")
 def show_components(name: str | None, key: str | None = None) -> None:
     """Print the list of block types, those of one kind, the description of one, or of its key."""
     console = terminal.console(120)
-    kinds = {one.partition(".")[0] for one in registered()}
+    kinds = {one.partition(".")[0] for one in entry_points_of()}
     if name is None:
-        _list(console, list(registered()))
+        _list(console, list(entry_points_of()))
         console.print()
         console.print("dsa-des components TYPE describes one; module:Class works as a type too.")
         console.print(
             "So are tables of scenes: scene, extends, blocks, wires, processors, weather, ..."
         )
         return
-    if name in kinds and name not in registered() and key is None:
-        _list(console, [one for one in registered() if one.partition(".")[0] == name])
+    if name in kinds and name not in entry_points_of() and key is None:
+        _list(console, [one for one in entry_points_of() if one.partition(".")[0] == name])
         return
     table = scene_tables().get(name)
     if table is not None:
@@ -50,7 +50,7 @@ def show_components(name: str | None, key: str | None = None) -> None:
     try:
         cls = find(name)
     except UnknownType as error:
-        known = [*registered(), *kinds, *scene_tables()]
+        known = [*entry_points_of(), *kinds, *scene_tables()]
         close = nearest(name, known)
         hint = f"; did you mean {close!r}?" if close else f"; kinds: {', '.join(sorted(kinds))}"
         message = f"{name}: there is no such block type, kind of blocks or table of scenes{hint}"
@@ -183,7 +183,7 @@ _CODE = "__pycache__"
 def show_examples(copy: str | None) -> None:
     """List all shipped scenes, studies and cases, or copy their folders with what they extend."""
     if copy is not None:
-        _copy(named(copy, _OPTION))
+        _copy(user_path(copy, _OPTION))
         return
     shipped = examples()
     if not shipped:
@@ -211,7 +211,7 @@ def _copy(target: Path) -> None:
         if os.path.lexists(target) and any(target.iterdir()):
             raise UsageError(f"{_OPTION} {target}: is not empty; a new folder is needed")
         path = location_of(target)
-        with unfinished(path) as folder:
+        with temporary_folder(path) as folder:
             copied = folder / "copy"
             copied.mkdir()
             several = len(sources) > 1

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.source_file import absolute
 from dsa_des.commands.study import (
-    as_sets,
     check_workers,
     finish,
+    options_as_sets,
     report_crashes,
     result_names,
     run_into,
@@ -30,10 +30,10 @@ from dsa_des.results.differences import changes_of, difference, paired_units
 from dsa_des.results.figures import safe_name
 from dsa_des.results.folder import STUDY_JSON, StudyFolder
 from dsa_des.results.labels import short
-from dsa_des.results.printing import rounded
+from dsa_des.results.printing import round_estimate
 from dsa_des.results.record import StudyRecord
 from dsa_des.results.tables import Tables
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.identity import record_of, results_of
@@ -43,7 +43,7 @@ from dsa_des.studies.study import MetricSpec, Study, command_of
 from dsa_des.studies.study_file import read_study, study_of_scene
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 _HOME = Path("studies")
 #: A comparison is not continued.
@@ -63,7 +63,7 @@ class _OfAll:
     def study(self, path: Path, swaps: Sequence[tuple[str, list[str]]] = ()) -> Study:
         """Return the study of a study file, or that of a scene."""
         if _is_study(path):
-            sets = (*self.sets, *as_sets((), self.seed, self.replicas))
+            sets = (*self.sets, *options_as_sets((), self.seed, self.replicas))
             return read_study(path, swaps, sets)
         replicas = _REPLICAS if self.replicas is None else self.replicas
         metrics = self._applicable(path, swaps)
@@ -75,7 +75,7 @@ class _OfAll:
         for block, types in swaps:
             scenes.append(load_scene(path, sets=self.sets, swaps=[f"{block}={types[-1]}"]))
         metrics = []
-        for name in registered(METRICS):
+        for name in entry_points_of(METRICS):
             try:
                 for scene in scenes:
                     MetricSpec(name).build(scene)
@@ -108,7 +108,7 @@ def compare_command(
     if swaps:
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
-        file = chosen_file(paths[0])
+        file = find_input_file(paths[0])
         repeat = command_of(words, sets, file)
         tables = _compare_swap(file, swaps, changes, results, workers, out, repeat)
         report_crashes(tables, _ANEW)
@@ -118,8 +118,8 @@ def compare_command(
         return
     if len(paths) < 2:
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
-    files = [chosen_file(path) for path in paths]
-    studies = [_study_at(path, changes) for path in files]
+    files = [find_input_file(path) for path in paths]
+    studies = [_load_study(path, changes) for path in files]
     for study in studies:
         if isinstance(study, Study):
             study.repeat = command_of(words, sets, *files)
@@ -169,9 +169,11 @@ def _compare_swap(
         folder = run_into(study, home, workers, resume=False, again=_ANEW)
     tables = finish(study, folder, only=results, first=_first(results))
     block, (own, _) = chosen[0]
-    for value, _, base, rows in tables.rows.against(f"swap.{block}", own):
+    for value, _, base, rows in tables.rows.comparisons_with_baseline(f"swap.{block}", own):
         for metric in tables.notable_results(results):
-            _farthest_apart(metric, ConditionPair(tables, base, tables, rows), (own, str(value)))
+            _list_farthest_runs(
+                metric, ConditionPair(tables, base, tables, rows), (own, str(value))
+            )
     return [tables]
 
 
@@ -184,7 +186,7 @@ def _is_study(path: Path) -> bool:
     return "scene" in data and "blocks" not in data
 
 
-def _study_at(path: Path, changes: _OfAll) -> Study | StudyRecord:
+def _load_study(path: Path, changes: _OfAll) -> Study | StudyRecord:
     """Return the study of a study file or a scene, or what a folder says of its own."""
     if not _is_folder(path):
         return changes.study(path)
@@ -212,11 +214,11 @@ def _tables(path: Path, study: Study | StudyRecord, workers: int | None, home: P
     return tables_of(study, folder)
 
 
-def _shown(tables: Tables, only: Sequence[str]) -> list[str]:
+def _results_to_show(tables: Tables, only: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(only or (line.result.name for line in tables.shown_lines())))
 
 
-def _farthest_apart(metric: str, pair: ConditionPair, names: tuple[str, str]) -> None:
+def _list_farthest_runs(metric: str, pair: ConditionPair, names: tuple[str, str]) -> None:
     """List the runs in which a result differs most, with a command that opens each."""
     first, second = pair.values(metric)
     known = np.flatnonzero(~np.isnan(first - second))
@@ -254,7 +256,7 @@ def _compare(
         )
     kinds = {result.name: result.kind for result in other.results if result.is_number}
     own, known = ({result.name for result in side.results} for side in (one, other))
-    metrics = [name for name in _shown(one, only) if name in kinds]
+    metrics = [name for name in _results_to_show(one, only) if name in kinds]
     headings = [*one.rows.axes, "result", "difference", "paired interval", "pairs",
              "unpaired interval"]  # fmt: skip
     lines: list[list[str]] = []
@@ -274,8 +276,8 @@ def _compare(
             pair = paired_units(units, *runs.values(metric))[1:]
             d = difference(*pair, one.record.confidence, one.record.interval, kind=kinds[metric])
             lines.append(
-                [*map(short, at), metric, *rounded(d.paired), str(d.paired.count),
-                 rounded(d.unpaired)[1].rstrip(" *")]
+                [*map(short, at), metric, *round_estimate(d.paired), str(d.paired.count),
+                 round_estimate(d.unpaired)[1].rstrip(" *")]
             )  # fmt: skip
             together.setdefault(metric, []).append(pair)
     shown = [r for r in one.results if r.name in known and (not only or r.name in only)]
@@ -283,12 +285,12 @@ def _compare(
     for who, there, others in ((names[0], one, known), (names[1], other, own)):
         alone = [r.name for r in there.results if r.name not in others]
         if alone:
-            say(f"only {shortened(who)} has {shortened(', '.join(alone), 300)}")
+            say(f"only {shorten(who)} has {shorten(', '.join(alone), 300)}")
     title = f"{names[1]} less {names[0]}, pair by pair"
     print_table(console(160), title, headings, lines, group=len(one.rows.axes))
     for _, runs in places:
         for metric in metrics:
-            _farthest_apart(metric, runs, names)
+            _list_farthest_runs(metric, runs, names)
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
         for metric, pairs in together.items():

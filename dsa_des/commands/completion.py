@@ -7,40 +7,40 @@ import click
 from click.shell_completion import CompletionItem
 
 from dsa_des.block.component import Component
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.registry import UnknownType, find
 from dsa_des.commands.parameters import parameter_rows, scene_tables
 from dsa_des.errors import SceneError
 from dsa_des.scene.block_table import BlockOptions
-from dsa_des.scene.examples import chosen_file
 from dsa_des.scene.examples import examples as shipped
+from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.scene import Scene, load_scene
 
 
 def scenes(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Return shipped scenes, and leave files to the shell."""
-    return _shipped("scene", incomplete)
+    return _complete_shipped("scene", incomplete)
 
 
 def studies(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Return shipped studies, and leave files to the shell; the further commands at first."""
     further = [CompletionItem(name) for name in ("report", "show") if name.startswith(incomplete)]
-    return further or _shipped("study", incomplete)
+    return further or _complete_shipped("study", incomplete)
 
 
 def examples(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Return shipped scenes and studies, and leave files to the shell."""
-    return _shipped("scene", incomplete) + _shipped("study", incomplete)
+    return _complete_shipped("scene", incomplete) + _complete_shipped("study", incomplete)
 
 
 def cases(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Return shipped cases, and leave files to the shell."""
-    return _shipped("case", incomplete)
+    return _complete_shipped("case", incomplete)
 
 
 def types(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Return block types, their kinds and the tables of scenes."""
-    names = registered()
+    names = entry_points_of()
     return _items(
         {*names, *(name.partition(".")[0] for name in names), *scene_tables()}, incomplete
     )
@@ -72,8 +72,8 @@ def swaps(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     if not equals:
         return _items((f"{block}=" for block in scene.blocks), name) if scene is not None else []
     kind = "" if scene is None else scene.blocks[name].type_name if name in scene.blocks else ""
-    of_kind = [one for one in registered() if one.partition(".")[0] == kind.partition(".")[0]]
-    return _items((f"{name}={one}" for one in of_kind or registered()), f"{name}={begin}")
+    of_kind = [one for one in entry_points_of() if one.partition(".")[0] == kind.partition(".")[0]]
+    return _items((f"{name}={one}" for one in of_kind or entry_points_of()), f"{name}={begin}")
 
 
 def _keys(cls: type[Component]) -> list[str]:
@@ -88,12 +88,12 @@ def _scene(ctx: click.Context) -> Scene | None:
     if name is None and ctx.args:
         name = ctx.args[0]
     try:
-        return None if name is None else load_scene(chosen_file(str(name), "scene"))
+        return None if name is None else load_scene(find_input_file(str(name), "scene"))
     except SceneError:
         return None
 
 
-def _shipped(kind: str, incomplete: str) -> list[CompletionItem]:
+def _complete_shipped(kind: str, incomplete: str) -> list[CompletionItem]:
     items = _items((one.name for one in shipped() if one.kind == kind), incomplete)
     return items or [CompletionItem(incomplete, type="file")]
 

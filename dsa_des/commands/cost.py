@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.foreign import NotImportable, load_named
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.block.registry import UnknownType, find
@@ -18,7 +18,7 @@ from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.running.reports import load_reports, notes_of_loading, say_notes
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.terminal.terminal import say, say_json
 
 #: Ladders of one block of a scene, those that change something in it.
@@ -64,13 +64,13 @@ def cost_of_accuracy(
     if scene is None:
         raise UsageError("SCENE is missing: only --map needs none")
     variants = Variants(
-        chosen_file(scene, "scene"), sets=sets, swaps=swaps, seed=seed, duration_s=duration
+        find_input_file(scene, "scene"), sets=sets, swaps=swaps, seed=seed, duration_s=duration
     )
     variants.scene.dropped = variants.dropped
     say_notes(notes_of_loading(variants.scene))
     climbs, notes = ladders_to_climb(variants, block, against)
     limits = parse_budgets(budgets, [ladder for _, ladder in climbs])
-    target = OutputFolder.chosen(out, Path("runs"), f"{variants.scene.path.stem}-cost")
+    target = OutputFolder.from_option(out, Path("runs"), f"{variants.scene.path.stem}-cost")
     compare = comparison()
     costs: list[RungCost] = []
     chain: list[dict[str, Any]] = []
@@ -210,7 +210,7 @@ def _draw_maps(name: str, out: str | None) -> None:
         draw: Any = load_named(functions[name], "--map")
     except NotImportable as error:
         raise UsageError(f"--map {name}: {functions[name]} cannot be loaded: {error}") from error
-    target = OutputFolder.chosen(out, Path("runs"), f"map-{name}")
+    target = OutputFolder.from_option(out, Path("runs"), f"map-{name}")
     with target.writing() as folder:
         paths = [Path(path).name for path in draw(folder)]
         write_run_json(folder, {"map": name})
@@ -220,7 +220,7 @@ def _draw_maps(name: str, out: str | None) -> None:
 def _map_functions() -> dict[str, str]:
     """Return the map function of each family of block types, ``geometry`` for ``geometry.*``."""
     functions: dict[str, str] = {}
-    for type_name in registered():
+    for type_name in entry_points_of():
         try:
             ladders = find(type_name).ladders
         except UnknownType:  # a broken plug-in

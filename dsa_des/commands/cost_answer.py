@@ -14,9 +14,9 @@ from dsa_des.answers.turns import Batch, TurnTimes, run_in_turns, turns_of
 from dsa_des.answers.verdicts import BEYOND, NOTHING, OPEN, Limit, parse_limits
 from dsa_des.commands.cost import CostProgress
 from dsa_des.commands.study import (
-    as_sets,
     begun_or_empty,
     check_workers,
+    options_as_sets,
     result_names,
     stop_with,
     target_of,
@@ -28,7 +28,7 @@ from dsa_des.record.run_folder import write_run_json
 from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.record import Result
 from dsa_des.results.rows import Rows, StoredRows
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.identity import description_text, results_of
 from dsa_des.studies.study import Study, command_of
@@ -60,7 +60,7 @@ def cost_at_the_answer(
     resume: bool,
     no_figures: bool,
 ) -> None:
-    """Run a study with each model in turn, write tables and print what they come to.
+    """Run a study with each model in turn, write the tables and print the verdicts.
 
     After ctrl-C what is finished is told and kept, to be resumed; exit code 130.
     """
@@ -72,8 +72,8 @@ def cost_at_the_answer(
         raise UsageError(f"--answer {answers[0]}: give a STUDY (dsa-des examples lists those that "
                          "are shipped)")  # fmt: skip
     check_workers(workers)
-    path = chosen_file(scene, "study")
-    sets = (*sets, *as_sets(swaps, seed, None))
+    path = find_input_file(scene, "study")
+    sets = (*sets, *options_as_sets(swaps, seed, None))
     sets = sets if duration is None else (*sets, f"set.duration_s={duration}")
     described = read_study(path, sets=sets)
     words = _words("answer", answers) + _words("vary", listed) + _words("budget", budgets)
@@ -94,7 +94,7 @@ def cost_at_the_answer(
     report = answer.report()
     rows = report.rows()
     said = {name: report.sentences(name) for name in report.verdicts}
-    content: dict[str, Any] = {"rows": rows, "sentences": said, "notes": report.about()}
+    content: dict[str, Any] = {"rows": rows, "sentences": said, "notes": report.notes_on_tables()}
     try:
         write_table(folder / "answer.parquet", rows)
         write_file(folder / "answer.csv", _csv(rows))
@@ -194,11 +194,11 @@ class AnswerOfStudy:
             )
 
         def after(done: int) -> list[int]:
-            left = self._left()
+            left = self._remaining_models()
             self.turn_times.keep(path / _TURNS, len(self._batches))
             report = self.report()
             going_on = done < len(self._batches)
-            progress.say(f"{self.done_text()}: {_how_many(report)}", always=going_on)
+            progress.say(f"{self.done_text()}: {_count_text(report)}", always=going_on)
             return left
 
         try:
@@ -238,8 +238,8 @@ class AnswerOfStudy:
     def _name(self, model: int) -> str:
         return str(self.study.axes[-1].labels[model])
 
-    def _left(self) -> list[int]:
-        """Return the models that gave something in the first turn, and keep why others did not."""
+    def _remaining_models(self) -> list[int]:
+        """Return the models that gave results in the first turn, and keep why the others failed."""
         assert self._folder is not None
         for table in self._folder.each_part(before_round=1):
             errors = table["error"].to_pylist()
@@ -262,7 +262,7 @@ class AnswerOfStudy:
         return f"{sum(many >= models for many in each)} of {len(self._batches)} turns"
 
     def report(self) -> AnswerReport:
-        """Return what the runs so far come to."""
+        """Return the report on the runs made so far."""
         study, folder = self.study, self._folder
         assert folder is not None
         rows = Rows(StoredRows(folder), [axis.column for axis in study.axes], study.over)
@@ -290,9 +290,9 @@ class AnswerOfStudy:
         )
 
 
-def _how_many(report: AnswerReport) -> str:
+def _count_text(report: AnswerReport) -> str:
     every = [verdict for some in report.verdicts.values() for verdict in some]
-    taken = sum(verdict.may_be_taken for verdict in every)
+    taken = sum(verdict.is_acceptable for verdict in every)
     kinds = [(BEYOND, "beyond the limit"), (OPEN, "open"), (NOTHING, "not compared")]
     parts = [f"{taken} of {len(every)} may be taken"]
     parts += [

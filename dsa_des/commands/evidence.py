@@ -17,10 +17,10 @@ from dsa_des.evidence.inputs import files_of_case
 from dsa_des.evidence.pack import INPUTS, MACHINE, PAGE, STUDIES, Pack
 from dsa_des.evidence.page import evidence_page
 from dsa_des.files.output_file import write_file
-from dsa_des.files.output_names import why_not_written
+from dsa_des.files.output_names import describe_write_error
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.tables import Tables
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.studies.runner import tables_of
 from dsa_des.studies.study import command_of
 from dsa_des.terminal.terminal import say
@@ -41,7 +41,7 @@ def evidence_command(
     check_workers(workers)
     if encounters is not None and encounters < 2:
         raise UsageError(f"--encounters is {encounters}: it must be 2 or more")
-    path = chosen_file(case, "case")
+    path = find_input_file(case, "case")
     checked = read_case(path, sets, encounters)
     location = target_of(_HOME, path.stem, out, resume)
     begun_or_empty(location, resume, "a pack")
@@ -59,7 +59,7 @@ def evidence_command(
         for name, content in inputs.items():
             _write(target / INPUTS / name, content)
     except OSError as error:
-        why = why_not_written(error, target)
+        why = describe_write_error(error, target)
         raise UsageError(f"--out {target}: cannot be written: {why}") from error
     folders: dict[str, StudyFolder] = {}
     tables: dict[str, Tables] = {}

@@ -9,14 +9,14 @@ import networkx as nx
 from dsa_des.commands.scene import SceneOptions, load
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import PICTURES, check_ending, check_file
-from dsa_des.files.output_names import named
+from dsa_des.files.output_names import user_path
 from dsa_des.record.drawing import drawing, figure_text
 from dsa_des.running.grain import grain_of
 from dsa_des.scene.graph import depths
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.terminal.terminal import console, say, say_lines
-from dsa_des.text.safe_text import printable, shortened
+from dsa_des.text.safe_text import printable, shorten
 
 
 def show_graph(dot: bool, png: bool, out: str | None, **options: Unpack[SceneOptions]) -> None:
@@ -27,7 +27,7 @@ def show_graph(dot: bool, png: bool, out: str | None, **options: Unpack[SceneOpt
     if dot:
         say_lines(to_dot(loaded))
     elif png:
-        path = Path(f"{loaded.path.stem}-graph.png") if out is None else named(out)
+        path = Path(f"{loaded.path.stem}-graph.png") if out is None else user_path(out)
         check_ending(path, PICTURES)
         check_file(path)
         draw_graph(loaded, path)
@@ -51,7 +51,7 @@ def _print_table(scene: Scene) -> None:
 
     depth = depths(scene.graph)
     windowed = grain_of(scene, None).windowed
-    table = Table(title=f"{shortened(scene.title)}: blocks in the order they run within an instant")
+    table = Table(title=f"{shorten(scene.title)}: blocks in the order they run within an instant")
     for heading in ("depth", "block", "type", "runs", "fed by"):
         table.add_column(heading)
     for name in sorted(scene.blocks, key=lambda n: (depth[n], n)):
@@ -62,31 +62,31 @@ def _print_table(scene: Scene) -> None:
         )  # fmt: skip
         grain = "look-ahead" if name in windowed else "scan by scan"
         fed = [
-            f"{shortened(w.source)}.{w.output}" + (f" ({_delay_label(w)})" if w.delayed else "")
+            f"{shorten(w.source)}.{w.output}" + (f" ({_delay_label(w)})" if w.is_delayed else "")
             for w in _wires(scene)
             if w.target == name
         ]
-        who = shortened(name), shortened(block.type_name)
+        who = shorten(name), shorten(block.type_name)
         table.add_row(str(depth[name]), *who, f"{when}, {grain}", ", ".join(fed))
     console().print(table)
 
 
 def to_dot(scene: Scene) -> str:
     """Return the graph in Graphviz's DOT language, always in the same order."""
-    lines = [f'digraph "{_escaped(scene.title)}" {{', "  rankdir=LR;", "  node [shape=box];"]
+    lines = [f'digraph "{_escape(scene.title)}" {{', "  rankdir=LR;", "  node [shape=box];"]
     for name, block in scene.blocks.items():
-        shown = f"{_escaped(name)}\\n{_escaped(block.type_name)}"
-        lines.append(f'  "{_escaped(name)}" [label="{shown}"];')
+        shown = f"{_escape(name)}\\n{_escape(block.type_name)}"
+        lines.append(f'  "{_escape(name)}" [label="{shown}"];')
     for wire in _wires(scene):
         message = scene.blocks[wire.source].cls.outputs[wire.output].message.__name__
-        sent = message + (f"\\n{_delay_label(wire)}" if wire.delayed else "")
-        style = ", style=dashed" if wire.delayed else ""
-        ends = f'"{_escaped(wire.source)}" -> "{_escaped(wire.target)}"'
+        sent = message + (f"\\n{_delay_label(wire)}" if wire.is_delayed else "")
+        style = ", style=dashed" if wire.is_delayed else ""
+        ends = f'"{_escape(wire.source)}" -> "{_escape(wire.target)}"'
         lines.append(f'  {ends} [label="{sent}"{style}];')
     return "\n".join([*lines, "}"])
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     return printable(text).replace("\\", "\\\\").replace('"', '\\"')
 
 
@@ -140,8 +140,8 @@ def _draw_wire(
         xytext=(x0, y0),
         arrowprops={
             "arrowstyle": "-|>",
-            "color": "#b4532a" if wire.delayed else "#555555",
-            "linestyle": "--" if wire.delayed else "-",
+            "color": "#b4532a" if wire.is_delayed else "#555555",
+            "linestyle": "--" if wire.is_delayed else "-",
             "patchA": boxes[wire.source].get_bbox_patch(),
             "patchB": boxes[wire.target].get_bbox_patch(),
             "shrinkA": 1,
@@ -149,7 +149,7 @@ def _draw_wire(
             "connectionstyle": "arc3,rad=-0.35" if backward else "arc3,rad=0",
         },
     )
-    if wire.delayed:
+    if wire.is_delayed:
         height = 0.35 * abs(x1 - x0) if backward else 0.0
         axes.text((x0 + x1) / 2, (y0 + y1) / 2 - height, _delay_label(wire), fontsize=7,
                   ha="center", va="center", color="#b4532a")  # fmt: skip

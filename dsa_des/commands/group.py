@@ -15,8 +15,8 @@ from typing import Any
 
 import click
 
-from dsa_des.block.entry_points import registered
-from dsa_des.block.foreign_calls import error_text, raised_in
+from dsa_des.block.entry_points import entry_points_of
+from dsa_des.block.foreign_calls import error_text, module_of_error
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say, say_lines
@@ -43,7 +43,7 @@ def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
             say_lines(f"error: {error}", err=True)
             sys.exit(getattr(error, "exit_code", 1))
         except SystemExit as error:
-            module = raised_in(error.__traceback__)
+            module = module_of_error(error.__traceback__)
             if module.partition(".")[0] in _OURS:
                 raise
             say(f"error: the module {module!r} left with {error_text(error)}", err=True)
@@ -222,16 +222,16 @@ class PluginGroup(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return our own commands and the registered ones, sorted."""
-        return sorted({*super().list_commands(ctx), *registered(COMMANDS)})
+        return sorted({*super().list_commands(ctx), *entry_points_of(COMMANDS)})
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return one command, our own first."""
         own = super().get_command(ctx, cmd_name)
-        if own is not None or cmd_name not in registered(COMMANDS):
+        if own is not None or cmd_name not in entry_points_of(COMMANDS):
             return own
-        from dsa_des.block.foreign import installed
+        from dsa_des.block.foreign import load_installed
 
-        command: Any = installed(registered(COMMANDS)[cmd_name])
+        command: Any = load_installed(entry_points_of(COMMANDS)[cmd_name])
         if not isinstance(command, click.Command):
             raise click.ClickException(
                 f"the registered command {cmd_name!r} is not a click.Command"

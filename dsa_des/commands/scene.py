@@ -23,13 +23,13 @@ from dsa_des.running.reports import (
 )
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.data_files import scene_of_data
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.scene import Scene, load_scene, load_tables
 from dsa_des.scene.scene_file import read_scene_tables
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import say, say_json
-from dsa_des.text.safe_text import shell_line, shortened
+from dsa_des.text.safe_text import shell_line, shorten
 
 
 class SceneOptions(TypedDict):
@@ -51,7 +51,7 @@ def load(
     noted: bool = False,
 ) -> Scene:
     """Load and check a scene; notes on that go to standard error, unless they are printed later."""
-    path = chosen_file(scene, "scene")
+    path = find_input_file(scene, "scene")
     data = scene_of_data(path)
     if data is None:
         loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
@@ -93,7 +93,7 @@ def run_scene(
     """Run a scene into a folder, then print its summary."""
     pacer = None if realtime is None else Pacer(parse_factor(realtime))
     loaded = load(**options, noted=True)
-    target = OutputFolder.chosen(out, Path("runs"), loaded.path.stem)
+    target = OutputFolder.from_option(out, Path("runs"), loaded.path.stem)
     summary = record_run(
         loaded,
         target,
@@ -116,7 +116,7 @@ def run_scene(
 
 
 @contextmanager
-def no_collection() -> Iterator[None]:
+def pause_garbage_collection() -> Iterator[None]:
     """Pause the search for cyclic garbage: of a million targets it takes a quarter of a check."""
     was_on = gc.isenabled()
     gc.disable()
@@ -139,7 +139,10 @@ def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
         verb = "does not import" if no_import else "imports"
         say(f"{foreign.key} = {foreign.name} {verb} the module {foreign.module}: {foreign.file}")
 
-    with no_collection(), imports(Imports(allowed=not no_import, announce=announce)) as policy:
+    with (
+        pause_garbage_collection(),
+        imports(Imports(allowed=not no_import, announce=announce)) as policy,
+    ):
         loaded = load(**options, noted=True)
         scene = options["scene"]
         for line in loaded.about:
@@ -185,16 +188,16 @@ def explain_scene(
     shares = measured_shares(loaded, simulate_everything) if measure else None
     console = terminal.console(_WIDE)  # no terminal: every sentence on one line
     # What the scene calls for stands first: most of what there is, it does not call for.
-    planned, rows = _planned(simulation, 0, shares)
+    planned, rows = _plan_effects(simulation, 0, shares)
     if not rows:
         console.print("No block of this scene declares effects.")
         return
     headings = ("block", "largest influence", "share of run time", "effect")
     acting = sum(item.built for item in planned)
-    title = f"{shortened(loaded.title)}: {acting} effects simulated, {len(planned) - acting} not"
+    title = f"{shorten(loaded.title)}: {acting} effects simulated, {len(planned) - acting} not"
     print_table(console, title, headings, rows, group=0)
     for number, stretch in enumerate(loaded.stretches, start=1):
-        known, rows = rows, _planned(simulation, number, shares)[1]
+        known, rows = rows, _plan_effects(simulation, number, shares)[1]
         title = f"From {float(stretch.from_s):g} s on, otherwise than before"
         if new := [row for row in rows if row not in known]:
             print_table(console, title, headings, new, group=0)
@@ -202,26 +205,28 @@ def explain_scene(
             console.print(f"{title}: nothing")
     if outside := [item for item in planned if not item.effect.neutral and not item.built]:
         console.print()
-        console.print(_outside_the_proof(outside))
+        console.print(_unproven_table(outside))
 
 
-def _planned(
+def _plan_effects(
     simulation: Simulation, stretch: int, shares: Mapping[tuple[str, str], float] | None
 ) -> tuple[list[Planned], list[tuple[str, str, str, str]]]:
-    """Return what became of the effects in a stretch of the scene, also as rows of a table."""
+    """Return which effects are built or left out in a stretch of the scene, also as rows of a
+    table.
+    """
     planned = [*simulation.plans[stretch], *simulation.timing_plan_of(stretch)]
     planned.sort(key=lambda item: not item.built)
     rows = []
     for item in planned:
         share = None if shares is None else shares.get((item.block, item.effect.name))
         timed = "" if share is None else f"{share:.1%}"
-        rows.append((shortened(item.block), _bound(item), timed, item.sentence()))
+        rows.append((shorten(item.block), _bound_text(item), timed, item.sentence()))
     for name, component in simulation.stretches[stretch].items():
-        rows += [(shortened(name), "", "", sentence) for sentence in component.left_out()]
+        rows += [(shorten(name), "", "", sentence) for sentence in component.left_out()]
     return planned, rows
 
 
-def _outside_the_proof(items: list[Planned]) -> Any:
+def _unproven_table(items: list[Planned]) -> Any:
     """Return a table of the effects that --simulate-everything leaves out, and why."""
     from rich.table import Table
 
@@ -238,11 +243,11 @@ def _outside_the_proof(items: list[Planned]) -> Any:
         why = item.effect.outside_the_proof or "it has no neutral form"
         reasons.setdefault((item.effect.name, why), []).append(item.block)
     for (name, why), blocks in reasons.items():
-        table.add_row(f"{', '.join(shortened(block) for block in blocks)}", f"{name}: {why}")
+        table.add_row(f"{', '.join(shorten(block) for block in blocks)}", f"{name}: {why}")
     return table
 
 
-def _bound(item: Planned) -> str:
+def _bound_text(item: Planned) -> str:
     return ", ".join(f"{q} {bound:.2g}" for q, bound in sorted(item.verdict.bound.items()))
 
 
@@ -254,13 +259,13 @@ class _Timed:
         self.spent_s = 0.0
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        return self._timed(self.built, *args, **kwargs)
+        return self._time_call(self.built, *args, **kwargs)
 
     def __getattr__(self, name: str) -> Any:
         value = getattr(self.built, name)
-        return partial(self._timed, value) if callable(value) else value
+        return partial(self._time_call, value) if callable(value) else value
 
-    def _timed(self, call: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    def _time_call(self, call: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
         started = time.perf_counter()
         try:
             return call(*args, **kwargs)

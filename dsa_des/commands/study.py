@@ -9,22 +9,29 @@ from typing import Any, NoReturn
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.files.output_file import check_file, write_file
-from dsa_des.files.output_names import check_place, claim_folder, named
+from dsa_des.files.output_names import check_place, claim_folder, user_path
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import STUDY_JSON, StudyFolder, latest_folder
 from dsa_des.results.printing import show
 from dsa_des.results.record import Result, StudyRecord
 from dsa_des.results.tables import DIFFERENCES, RATIOS, REQUIREMENTS, SUMMARY, Tables
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.overrides import parse_assignment
 from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.identity import description_text
-from dsa_des.studies.runner import Clock, Stopped, draw_run, run_study, tables_of, why_one_by_one
+from dsa_des.studies.runner import (
+    Clock,
+    Stopped,
+    draw_run,
+    run_study,
+    study_lock_step_refusal,
+    tables_of,
+)
 from dsa_des.studies.study import Study, command_of
 from dsa_des.studies.study_file import read_study
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say, say_json
-from dsa_des.text.safe_text import shell_line, shortened
+from dsa_des.text.safe_text import shell_line, shorten
 
 _HOME = Path("studies")
 _MOST_WORKERS = 1024
@@ -53,8 +60,8 @@ def study_command(
         return
     if study is None:
         raise UsageError("give a STUDY (dsa-des examples lists those that are shipped)")
-    name, path = study, chosen_file(study, "study")
-    sets = (*sets, *as_sets(swaps, seed, replicas))
+    name, path = study, find_input_file(study, "study")
+    sets = (*sets, *options_as_sets(swaps, seed, replicas))
     described = read_study(path, sets=sets)
     described.repeat = command_of(["study"], sets, described.path)
 
@@ -74,7 +81,7 @@ def study_command(
     report_crashes([tables], again(folder.path))
 
 
-def as_sets(swaps: Sequence[str], seed: int | None, replicas: int | None) -> list[str]:
+def options_as_sets(swaps: Sequence[str], seed: int | None, replicas: int | None) -> list[str]:
     """Return options as changes of a study file, as --set has them."""
     sets = []
     for swap in swaps:
@@ -105,7 +112,7 @@ def begun_or_empty(location: "Path | Callable[[], Path]", resume: bool, what: st
 def target_of(home: Path, stem: str, out: str | None, resume: bool) -> "Path | Callable[[], Path]":
     """Return the folder that --out names, or the latest to go on with, or what makes a new one."""
     if out is not None:
-        return named(out)
+        return user_path(out)
     if resume:
         earlier = latest_folder(home, stem)
         if earlier is None:
@@ -225,20 +232,20 @@ def finish(
     except OSError as error:
         raise UsageError(f"{folder.path}: cannot be written: {error.strerror or error}") from error
     if as_json:
-        say_json(_as_json(tables, figures))
+        say_json(_tables_as_json(tables, figures))
     elif not quiet:
         first(tables)
         show(terminal.console(160), tables, only)
         for path in figures:
             say(f"wrote {path}")
-        if isinstance(study, Study) and (reason := why_one_by_one(study)):
+        if isinstance(study, Study) and (reason := study_lock_step_refusal(study)):
             say(f"replicas ran one by one where they cannot run in lock step: {reason}")
         say()
         say(f'pandas.read_parquet("{folder.parts}") opens all {_count(tables)} runs')
     return tables
 
 
-def _as_json(tables: Tables, figures: Sequence[Path]) -> dict[str, Any]:
+def _tables_as_json(tables: Tables, figures: Sequence[Path]) -> dict[str, Any]:
     """Return the tables that a study's folder holds as rows, and where it is."""
     rows = {
         name.removesuffix(".parquet"): [] if table is None else table.to_pylist()
@@ -292,7 +299,7 @@ def report_command(folder: str, out: str | None, no_figures: bool, measure: bool
 
     path = Path(folder)
     study = StudyFolder(path)
-    target = path / REPORT if out is None else named(out)
+    target = path / REPORT if out is None else user_path(out)
     if out is not None:
         check_file(target)
     if measure:
@@ -310,7 +317,7 @@ def result_names(
     results: Sequence[Result], only: Sequence[str], option: str = "--metric"
 ) -> list[str]:
     """Return the names of results; UsageError where an option names none."""
-    every = [result.name for result in results if result.summed_up]
+    every = [result.name for result in results if result.is_summarised]
     for name in only:
         if name not in every:
             raise UsageError(f"{option} {name}: there is no such result{did_you_mean(name, every)}")
@@ -323,7 +330,7 @@ def _progress(study: Study) -> Iterator[Any]:
     clock = Clock()
     if sys.stderr.isatty():
         with terminal.progress("text") as bar:
-            task = bar.add_task(shortened(study.title), total=None, text="")
+            task = bar.add_task(shorten(study.title), total=None, text="")
 
             def update(progress: Any) -> None:
                 text = clock.text(progress)
@@ -348,7 +355,7 @@ def _progress(study: Study) -> Iterator[Any]:
 def _list_metrics() -> None:
     from rich.table import Table
 
-    from dsa_des.block.entry_points import registered
+    from dsa_des.block.entry_points import entry_points_of
     from dsa_des.commands.parameters import parameter_rows
     from dsa_des.studies.metric import METRICS, find_metric
 
@@ -356,7 +363,7 @@ def _list_metrics() -> None:
     table = Table(box=None, pad_edge=False)
     for heading in ("metric", "reads", "keys", "what it is"):
         table.add_column(heading, no_wrap=heading == "metric")
-    for name in registered(METRICS):
+    for name in entry_points_of(METRICS):
         try:
             cls = find_metric(name)
         except ValueError as error:  # a broken plug-in must not hide the others

@@ -13,7 +13,7 @@ from dsa_des.results.labels import short, unit_of
 from dsa_des.results.record import EVENT, Result
 from dsa_des.results.tables import Tables
 from dsa_des.terminal.terminal import console, say
-from dsa_des.text.safe_text import printable, shortened
+from dsa_des.text.safe_text import printable, shorten
 
 #: Combinations of axis values that are listed, and results that a line names.
 _MOST_PLACES, _MOST_NAMED = 12, 8
@@ -61,7 +61,7 @@ class _Change:
     mean: float
 
     @property
-    def any(self) -> bool:
+    def has_change(self) -> bool:
         return bool(self.fell or self.rose or self.gone or self.come)
 
     def clauses(self) -> list[str]:
@@ -96,7 +96,7 @@ def say_what_changed(
     """
     results = [result for result in results if result.is_number]
     width: int = console(160).width
-    say(f"What changed from {shortened(names[0])} to {shortened(names[1])}:")
+    say(f"What changed from {shorten(names[0])} to {shorten(names[1])}:")
     for where, pair in places[:_MOST_PLACES]:
         changes = [_change(result, pair) for result in results]
         indent = "  "
@@ -121,12 +121,12 @@ def _lines(changes: Sequence[_Change]) -> list[str]:
     for change in changes:
         if change.result.told is not None:
             clauses.setdefault(change.result.told.who, []).extend(change.clauses())
-    lines = [f"{shortened(who)}: {'; '.join(said)}" for who, said in clauses.items() if said]
-    same = [shortened(who) for who, said in clauses.items() if not said]
+    lines = [f"{shorten(who)}: {'; '.join(said)}" for who, said in clauses.items() if said]
+    same = [shorten(who) for who, said in clauses.items() if not said]
     if same:
         lines.append(f"as before: {', '.join(same)}")
     others = [change for change in changes if change.result.told is None]
-    changed = [change for change in others if change.any]
+    changed = [change for change in others if change.has_change]
     if changed:
         shown = [_brief(change) for change in changed[:_MOST_NAMED]]
         more = len(changed) - _MOST_NAMED
@@ -141,7 +141,7 @@ def _lines(changes: Sequence[_Change]) -> list[str]:
 
 
 def _brief(change: _Change) -> str:
-    name = shortened(change.result.name)
+    name = shorten(change.result.name)
     if change.amount:
         return f"{name} ({change.amount} on average)"
     return f"{name} (only one of the two has it in {change.gone + change.come})"
@@ -163,9 +163,9 @@ def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
     if tables.baseline is None:
         return
     axis, baseline = tables.baseline
-    names_of = [shortened(name) for name in tables.rows.axes if name != axis]
+    names_of = [shorten(name) for name in tables.rows.axes if name != axis]
     by_value: dict[Any, list[tuple[str, ConditionPair]]] = {}
-    for value, others, base, rows in tables.rows.against(axis, baseline):
+    for value, others, base, rows in tables.rows.comparisons_with_baseline(axis, baseline):
         where = [f"{n} = {short(other)}" for n, other in zip(names_of, others, strict=True)]
         pair = ConditionPair(tables, base, tables, rows)
         by_value.setdefault(value, []).append((", ".join(where), pair))

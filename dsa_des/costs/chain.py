@@ -13,7 +13,7 @@ from typing import Any
 
 from dsa_des.block.ladder import Unavailable
 from dsa_des.block.mark import RED
-from dsa_des.costs.climb import Comparison, RungCost, on_front
+from dsa_des.costs.climb import Comparison, RungCost, is_on_front
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks
@@ -46,26 +46,26 @@ def run_chain(
     whole = _count(chosen)
     while _count(chosen) > MOST:
         widest = max(chosen, key=len)
-        widest.remove(_most_expendable(widest))
+        widest.remove(_choose_expendable(widest))
     combinations = list(itertools.product(*chosen))
     best = [next(c for c in group if c.rung == c.reference) for group in groups]
     reference_scene = variants.with_rungs(_choices(best))
-    reference = _recorded(reference_scene)
+    reference = _run_recorded(reference_scene)
     rows: list[dict[str, Any]] = []
     scenes: list[Scene] = []
     for combination in combinations:
         try:
             scene = variants.with_rungs(_choices(combination))
-            effect = comparison(reference, _recorded(scene))
+            effect = comparison(reference, _run_recorded(scene))
         except (Unavailable, SceneError, BlockFailure):
             continue
         scenes.append(scene)
         rows.append(_row(combination, comparison, effect))
-    times = _timed(scenes)
+    times = _time_runs(scenes)
     for row, cpu_s, scene in zip(rows, times, scenes, strict=True):
         row["cpu_us_per_target_scan"] = 1e6 * cpu_s / max(_target_scans(scene), 1)
     points = [(row["cpu_us_per_target_scan"], row["error_p95"]) for row in rows]
-    for row, front in zip(rows, on_front(points), strict=True):
+    for row, front in zip(rows, is_on_front(points), strict=True):
         row["pareto"] = front
     picked = (
         f"whole chain: {len(rows)} combinations of the rungs on their own ladder's front and the "
@@ -83,7 +83,7 @@ def _count(groups: Sequence[Sequence[RungCost]]) -> int:
     return count
 
 
-def _most_expendable(group: Group) -> RungCost:
+def _choose_expendable(group: Group) -> RungCost:
     """Return the rung between the cheapest and the reference that is nearest in cost to another."""
     inner = [c for c in group if c.rung != c.reference and not c.in_scene]
     inner = inner or [c for c in group if c.rung != c.reference]
@@ -102,13 +102,13 @@ def _choices(combination: Sequence[RungCost]) -> list[Choice]:
     return [Choice(c.block, c.ladder, c.ladder.rung(c.rung)) for c in combination]
 
 
-def _recorded(scene: Scene) -> dict[str, Any]:
+def _run_recorded(scene: Scene) -> dict[str, Any]:
     sink = MemorySink()
     Simulation(scene, recorder=Recorder([sink])).run()
     return sink.tables()
 
 
-def _timed(scenes: Sequence[Scene]) -> list[float]:
+def _time_runs(scenes: Sequence[Scene]) -> list[float]:
     best = [float("inf")] * len(scenes)
     for _ in range(_REPEATS):
         for index, scene in enumerate(scenes):

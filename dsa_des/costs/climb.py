@@ -12,8 +12,8 @@ from dsa_des.costs.replay import (
     Spread,
     Values,
     errors_against,
+    errors_against_precise,
     median_and_spread,
-    own_errors,
     run_rung,
     time_interleaved,
     values_of,
@@ -26,7 +26,7 @@ from dsa_des.running.simulation import Simulation
 _BUDGET = re.compile(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S+)\s*")
 
 
-def on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
+def is_on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
     """Return which (cost, error) no other point beats: none is as good on both and better on one.
 
     A NaN error is on no front.
@@ -109,7 +109,7 @@ class Comparison:
         ]
 
 
-def shown(change: Change, changes: Mapping[str, Any], none: str) -> str:
+def show_number(change: Change, changes: Mapping[str, Any], none: str) -> str:
     """Return one number as its table shows it, or `none` where it is unknown."""
     value = changes.get(change.key)
     return none if value is None else format(value, change.form)
@@ -252,13 +252,13 @@ def climb(
         if cost.unavailable:
             continue
         run = runs[rung.name]
-        cost.in_scene = _same_block(run, variants, block)
+        cost.in_scene = _is_same_block(run, variants, block)
         scale = 1e6 / max(run.target_scans() * targets, 1)
         median, spread = median_and_spread(run.repeats_s)
         cost.cpu_us_per_target_scan, cost.cpu_spread_us = median * scale, spread * scale
         cost.repeats = len(run.repeats_s)
         if rung.name == reference:
-            cost.errors, cost.error_note = own_errors(ladder, run, known[""])
+            cost.errors, cost.error_note = errors_against_precise(ladder, run, known[""])
         else:
             key = str(sorted(rung.shared.items())) if rung.shared else ""
             baseline = baselines[key]
@@ -297,7 +297,7 @@ def _targets(values: Values, ladder: Ladder) -> int:
     return int(values[1][ladder.quantities[0].name].shape[1])
 
 
-def _same_block(run: RungRun, variants: Variants, block: str) -> bool:
+def _is_same_block(run: RungRun, variants: Variants, block: str) -> bool:
     mine, scenes = run.scene.blocks[block], variants.scene.blocks[block]
     return (
         mine.cls is scenes.cls
@@ -332,7 +332,7 @@ def _mark(
         (c.cpu_us_per_target_scan, 0.0 if c.rung == c.reference and not c.errors else c.error.p95)
         for c in known
     ]
-    for cost, front in zip(known, on_front(points), strict=True):
+    for cost, front in zip(known, is_on_front(points), strict=True):
         cost.pareto = front
         limits = {
             quantity.name: limit

@@ -9,12 +9,12 @@ from textwrap import wrap
 from typing import Any
 
 from dsa_des.block.mark import RED
-from dsa_des.costs.climb import Comparison, RungCost, shown
+from dsa_des.costs.climb import Comparison, RungCost, show_number
 from dsa_des.files.output_file import write_file
 from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 _NO_ERROR = "-"
 
@@ -24,7 +24,7 @@ def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    flat = [_flattened(row) for row in rows]
+    flat = [_flatten(row) for row in rows]
     names = list(dict.fromkeys(name for row in flat for name in row))
     # To memory first: a Parquet writer on a full disk fails a second time when it is collected.
     content = io.BytesIO()
@@ -32,11 +32,11 @@ def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     write_file(path, content.getvalue())
 
 
-def _flattened(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def _flatten(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for name, value in row.items():
         if isinstance(value, Mapping):
-            flat.update(_flattened(value, f"{prefix}{name}_"))
+            flat.update(_flatten(value, f"{prefix}{name}_"))
         else:
             flat[f"{prefix}{name}"] = ", ".join(value) if isinstance(value, list) else value
     return flat
@@ -53,7 +53,7 @@ def print_ladder(rungs: Sequence[RungCost], comparison: Comparison) -> None:
     console.print()
     rows = [_cells(cost, comparison) for cost in rungs]
     last = len(headings) - 1
-    title = f"{shortened(first.block)}, {what}"
+    title = f"{shorten(first.block)}, {what}"
     print_table(console, title, headings, rows, below=last, right=range(1, last))
 
 
@@ -74,7 +74,7 @@ def _cells(cost: RungCost, comparison: Comparison) -> list[str]:
         missing = f"not available: {cost.unavailable}"
         return [name, *[_NO_ERROR] * (4 + len(comparison.changes)), missing]
     errors = [cost.error.mean, cost.error.p95, cost.error.maximum]
-    effects = [shown(change, cost.effect, _NO_ERROR) for change in comparison.changes]
+    effects = [show_number(change, cost.effect, _NO_ERROR) for change in comparison.changes]
     return [
         name,
         f"{_plain(cost.cpu_us_per_target_scan)} ± {_plain(cost.cpu_spread_us, 1)}",
@@ -103,7 +103,7 @@ def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]], comparison: C
         [
             _plain(row["cpu_us_per_target_scan"]),
             f"{row['error_p95']:.2%}",
-            *(shown(change, row["effect"], _NO_ERROR) for change in telling),
+            *(show_number(change, row["effect"], _NO_ERROR) for change in telling),
             row["rung"],
         ]
         for row in sorted(chain, key=lambda row: float(row["cpu_us_per_target_scan"]))

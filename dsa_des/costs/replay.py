@@ -181,7 +181,7 @@ class Spread:
     count: int
 
     @classmethod
-    def of(cls, errors: FloatArray) -> "Spread":
+    def from_errors(cls, errors: FloatArray) -> "Spread":
         """Return the spread of errors, leaving NaN out."""
         known = errors[~np.isnan(errors)]
         if known.size == 0:
@@ -211,26 +211,31 @@ def errors_against(ladder: Ladder, rung: Values, reference: Values) -> dict[str,
     spreads = {}
     for quantity in ladder.quantities:
         apart = quantity.difference(values[quantity.name][here], others[quantity.name][there])
-        spreads[quantity.name] = Spread.of(apart)
+        spreads[quantity.name] = Spread.from_errors(apart)
     return spreads
 
 
-def own_errors(ladder: Ladder, run: RungRun, values: Values) -> tuple[dict[str, Spread], str]:
+def errors_against_precise(
+    ladder: Ladder, run: RungRun, values: Values
+) -> tuple[dict[str, Spread], str]:
     """Return a rung's error against a far more precise evaluation, or why there is none."""
     if ladder.truth is None:
         return {}, "nothing more exact is known"
     try:
-        parts = _sampled(ladder.truth, run, _known(ladder, values), values[0])
+        parts = _evaluate_sample(ladder.truth, run, _sample_known(ladder, values), values[0])
     except ImportError as error:
         return {}, f"not measured: {error}"
     except Unavailable as error:
         return {}, str(error)
-    spreads = {name: Spread.of(np.concatenate([part[name] for part in parts])) for name in parts[0]}
+    spreads = {
+        name: Spread.from_errors(np.concatenate([part[name] for part in parts]))
+        for name in parts[0]
+    }
     count = max(spread.count for spread in spreads.values())
     return spreads, f"measured at {count} target-scans"
 
 
-def _known(ladder: Ladder, values: Values) -> IntArray:
+def _sample_known(ladder: Ladder, values: Values) -> IntArray:
     """Return (row, target) of a sample, evenly spread over what the first quantity knows."""
     first = values[1][ladder.quantities[0].name]
     unknown = np.isnan(first)
@@ -240,7 +245,7 @@ def _known(ladder: Ladder, values: Values) -> IntArray:
     return pairs
 
 
-def _sampled(
+def _evaluate_sample(
     truth: Truth, run: RungRun, pairs: IntArray, ticks: IntArray
 ) -> Sequence[Mapping[str, FloatArray]]:
     if len(pairs) == 0:

@@ -63,7 +63,7 @@ class Variants:
         for choice in choices:
             self._apply(scene_file, choice)
         for choice in shared:
-            _set(scene_file, choice.block, choice.rung.shared)
+            _set_parameters(scene_file, choice.block, choice.rung.shared)
         try:
             return check_scene(scene_file)
         except SceneError as error:
@@ -78,14 +78,14 @@ class Variants:
             swap_type(scene_file, choice.block, choice.rung.type_name, COMMAND_LINE)
             if scene_file.problems:
                 raise Unavailable("; ".join(_brief(problem) for problem in scene_file.problems))
-        _set(scene_file, choice.block, values)
+        _set_parameters(scene_file, choice.block, values)
         for table, keys in choice.rung.sections.items():
             for key, value in keys.items():
                 scene_file.data.setdefault(table, {})[key] = value
                 scene_file.sources[(table, key)] = COMMAND_LINE
 
 
-def _set(scene_file: SceneFile, block: str, values: Mapping[str, Any]) -> None:
+def _set_parameters(scene_file: SceneFile, block: str, values: Mapping[str, Any]) -> None:
     for key, value in values.items():
         scene_file.data["blocks"][block][key] = value
         scene_file.sources[("blocks", block, key)] = COMMAND_LINE

@@ -16,18 +16,18 @@ from typing import Any
 import numpy as np
 from networkx import ancestors
 
-from dsa_des.arrays.run_ticks import RunTicks, no_runs
+from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Input, ends_its_run
-from dsa_des.block.entry_points import registered
-from dsa_des.block.foreign import installed
-from dsa_des.block.foreign_calls import must_pass
+from dsa_des.block.entry_points import entry_points_of
+from dsa_des.block.foreign import load_installed
+from dsa_des.block.foreign_calls import is_stop_request
 from dsa_des.block.message import Message
 from dsa_des.errors import Problem, SceneError
 from dsa_des.running.channel import Inputs
 from dsa_des.running.node import Node
 from dsa_des.running.simulation import Simulation, block_failure
-from dsa_des.scene.graph import in_cycles
+from dsa_des.scene.graph import cycle_numbers
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire as WireOfScene
 from dsa_des.time.clock import MAX_TICK, ScanCursor, parse_rational
@@ -48,8 +48,8 @@ for _constant in (_FIRST_ROW, _NO_ROW, _NO_SCAN):
 
 
 def __getattr__(name: str) -> Any:
-    if name in registered(EMBED):
-        return installed(registered(EMBED)[name])
+    if name in entry_points_of(EMBED):
+        return load_installed(entry_points_of(EMBED)[name])
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
@@ -86,7 +86,7 @@ class _Wire:
 
     def __init__(self, sender: tuple[str, str], declared: Input) -> None:
         self.sender, self.source = sender, sender[0]
-        self.held, self.trigger = declared.held, declared.mode == "trigger"
+        self.held, self.trigger = declared.is_held, declared.mode == "trigger"
         self._last: Message | None = None
         self._waiting: list[tuple[int, Message]] = []
 
@@ -215,14 +215,14 @@ class HostDriven:
         elapsed = tick - self._first_tick if self._calls else 0
         steps = max(_SUBSTEPS * self._calls, _STEPS_PER_S * elapsed // self.ticks_per_s)
         drift = int((1 + steps) * ulp_s * self.ticks_per_s)
-        return self._meant(tick, drift) if drift else tick
+        return self._snap_to_scan(tick, drift) if drift else tick
 
-    def _meant(self, tick: int, drift: int) -> int:
+    def _snap_to_scan(self, tick: int, drift: int) -> int:
         """Return the instant of the next scan of a block that lies so near, or the tick itself."""
         if self.last_tick - drift <= tick < self.last_tick:
             return self.last_tick  # that scan was made already
         drift = min(drift, (tick - self.last_tick) // _NEAR)
-        scans = [cursor.after(tick - drift - 1) for cursor in self._cursors.values()]
+        scans = [cursor.next_scan_tick(tick - drift - 1) for cursor in self._cursors.values()]
         scan = min(scans, key=lambda at: abs(at - tick), default=tick)
         return scan if abs(scan - tick) <= drift else tick
 
@@ -235,7 +235,10 @@ class HostDriven:
 
     def scan_after(self, after: int) -> float:
         """Return the same for a tick."""
-        return min(cursor.after(after) for cursor in self._cursors.values()) / self.ticks_per_s
+        return (
+            min(cursor.next_scan_tick(after) for cursor in self._cursors.values())
+            / self.ticks_per_s
+        )
 
     def due(self, tick: int) -> Step:
         """Return which scans are made by a call at `tick`.
@@ -277,7 +280,7 @@ class HostDriven:
         """
         sent, scans, tick = step.sent, step.scans, step.tick
         sent[self._source_key] = message
-        now = RunTicks(no_runs(1), np.array([tick], dtype=np.int64))
+        now = RunTicks(runs_of_single(1), np.array([tick], dtype=np.int64))
         for runner in self._runners:
             triggered = False
             for wire in runner.wires:
@@ -296,13 +299,13 @@ class HostDriven:
                 continue
             own = _NO_SCAN if scan is None else np.array([scan], dtype=np.int64)
             demand = partial(_rows_of, runner.demands, scans) if runner.demands else None
-            wake = runner.inputs.seen(now, own, tick + 1, demand, clock=runner.before, idle=idle)
+            wake = runner.inputs.wake_at(now, own, tick + 1, demand, clock=runner.before, idle=idle)
             if wake is None:
                 continue
             try:
                 result = runner.component.run(wake)
             except BaseException as error:
-                if must_pass(error):
+                if is_stop_request(error):
                     raise
                 time_s = tick / self.ticks_per_s
                 raise block_failure(runner.component, time_s, error, scan) from error
@@ -333,7 +336,7 @@ def _rows_of(
 def _refusals(scene: Scene, source: str) -> list[Problem]:
     """Say what of a scene needs an event queue."""
     refusals: list[tuple[str, str]] = []
-    looped = in_cycles(scene.graph)
+    looped = cycle_numbers(scene.graph)
     if looped:
         refusals.append(("wires", f"feedback between {', '.join(sorted(looped))}"))
     if scene.changes:
@@ -341,7 +344,7 @@ def _refusals(scene: Scene, source: str) -> list[Problem]:
     if scene.outages:
         refusals.append(("outages", "blocks that fail at random"))
     for wire in scene.wires:
-        if wire.delayed or wire.jitter_s or wire.drop_probability:
+        if wire.is_delayed or wire.jitter_s or wire.drop_probability:
             refusals.append(("wires", f"{wire} has a delay, jitter, latency or loss"))
     for name, block in scene.blocks.items():
         if block.options.processor is not None:

@@ -40,11 +40,15 @@ def foreseen(asked: str, many: int, seconds_each: float, bytes_each: float) -> s
         If it would take longer, or write more, than is ever begun; with how many pieces may.
     """
     seconds, size = many * seconds_each, many * bytes_each
-    said = f"{asked}: about {_in(seconds, _UNITS)} of a processor and {_in(size, _SIZES)}"
+    said = (
+        f"{asked}: about {_format_in_unit(seconds, _UNITS)} of a processor "
+        f"and {_format_in_unit(size, _SIZES)}"
+    )
     if seconds > MOST_SECONDS or size > MOST_BYTES:
         share = min(MOST_SECONDS / seconds, MOST_BYTES / size)
         raise UsageError(
-            f"{said}; at most {_in(MOST_SECONDS, _UNITS)} and {_in(MOST_BYTES, _SIZES)} are begun, "
+            f"{said}; at most {_format_in_unit(MOST_SECONDS, _UNITS)} "
+            f"and {_format_in_unit(MOST_BYTES, _SIZES)} are begun, "
             f"which a share of {share:.2g} of it would take"
         )
     return said if seconds > LONG_SECONDS or size > LARGE_BYTES else ""
@@ -58,6 +62,6 @@ def refuse_samples(asked: str, samples: float) -> None:
         )
 
 
-def _in(value: float, units: tuple[tuple[float, str], ...]) -> str:
+def _format_in_unit(value: float, units: tuple[tuple[float, str], ...]) -> str:
     size, unit = next((size, unit) for size, unit in units if value >= size)
     return f"{value / (size or (1e3 if unit == 'kB' else 1.0)):.3g} {unit}"

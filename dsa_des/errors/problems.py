@@ -10,7 +10,7 @@ from datetime import date, time
 from difflib import get_close_matches
 from typing import Any
 
-from dsa_des.text.safe_text import MOST_OF_A_VALUE, printable, shortened
+from dsa_des.text.safe_text import MOST_OF_A_VALUE, printable, shorten
 
 #: Problems that are listed in one error; the others are only counted.
 MOST_PROBLEMS = 20
@@ -43,7 +43,7 @@ def did_you_mean(name: str, allowed: Iterable[str]) -> str:
         return f"; did you mean {close!r}?"
     if not names:
         return ""
-    shown = ", ".join(shortened(name, MOST_OF_A_VALUE) for name in names[:12])
+    shown = ", ".join(shorten(name, MOST_OF_A_VALUE) for name in names[:12])
     shown += ", ..." if len(names) > 12 else ""
     return f"; allowed: {shown}"
 
@@ -74,7 +74,7 @@ class Lines(str):
     __slots__ = ()
 
     @classmethod
-    def of(cls, lines: Iterable[object]) -> "Lines":
+    def from_lines(cls, lines: Iterable[object]) -> "Lines":
         """Return lines, made printable, as one message."""
         return cls("\n".join(printable(line) for line in lines))
 
@@ -86,7 +86,7 @@ def shown_value(value: Any) -> str:
     """
     if isinstance(value, str):
         # Cut before it is quoted: a long text is not copied.
-        return shortened(repr(str(value[: MOST_OF_A_VALUE + 1])), MOST_OF_A_VALUE)
+        return shorten(repr(str(value[: MOST_OF_A_VALUE + 1])), MOST_OF_A_VALUE)
     if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 400:
         return f"a whole number of {value.bit_length()} bits"
     if isinstance(value, dict | list | tuple):
@@ -98,12 +98,12 @@ def shown_value(value: Any) -> str:
             if isinstance(value, dict):
                 text += f": {shown_value(value[item])}"
             if len(text) > MOST_OF_A_VALUE:
-                return shortened(text, MOST_OF_A_VALUE)
+                return shorten(text, MOST_OF_A_VALUE)
         text += "," if isinstance(value, tuple) and len(value) == 1 else ""
-        return shortened(text + right, MOST_OF_A_VALUE)
+        return shorten(text + right, MOST_OF_A_VALUE)
     if isinstance(value, date | time):
         return value.isoformat()
-    return shortened(repr(value), MOST_OF_A_VALUE)
+    return shorten(repr(value), MOST_OF_A_VALUE)
 
 
 _UNSET: Any = object()
@@ -131,15 +131,13 @@ class Problem:
     value: Any = _UNSET
 
     def __str__(self) -> str:
-        where = shortened(self.source, _LINE_LENGTH)
-        where += f": {shortened(self.key, _KEY_LENGTH)}" if self.key else ""
+        where = shorten(self.source, _LINE_LENGTH)
+        where += f": {shorten(self.key, _KEY_LENGTH)}" if self.key else ""
         if self.value is not _UNSET:
             where += f" = {shown_value(self.value)}"
         # On one line whatever stands in a name: a name cannot imitate a message of ours.
         lines = self.message.split("\n") if isinstance(self.message, Lines) else [self.message]
-        return f"{where}: " + "\n".join(
-            shortened(line, _LINE_LENGTH) for line in lines[:_MOST_LINES]
-        )
+        return f"{where}: " + "\n".join(shorten(line, _LINE_LENGTH) for line in lines[:_MOST_LINES])
 
 
 class SceneError(Exception):

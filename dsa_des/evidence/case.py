@@ -23,7 +23,7 @@ from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.identity import results_of
 from dsa_des.studies.study import Study, set_text
 from dsa_des.studies.study_file import read_study
-from dsa_des.text.run_commands import as_text
+from dsa_des.text.run_commands import format_value
 
 #: The name of the study of the system itself, and of the one that changes a parameter at a time.
 ASSESSED, SENSITIVITY = "assessed", "sensitivity"
@@ -33,13 +33,13 @@ WIRES = "wires"
 CHANGED, AS_STATED = "changed", "as stated"
 
 
-def _said(text: str) -> str:
+def _printable(text: str) -> str:
     if not text.strip():
         raise ValueError("must not be empty")
     return text
 
 
-_Text = Annotated[str, AfterValidator(_said)]
+_Text = Annotated[str, AfterValidator(_printable)]
 
 
 class AssessedSystem(Parameters):
@@ -63,7 +63,7 @@ class CaseRequirement(Parameters):
     least: float | None = None
 
     @model_validator(mode="after")
-    def _one_limit(self) -> Any:
+    def _check_one_limit(self) -> Any:
         if (self.most is None) == (self.least is None):
             raise ValueError("a requirement has one limit: most = NUMBER or least = NUMBER")
         return self
@@ -73,11 +73,11 @@ class CaseRequirement(Parameters):
         """The number that the result is held against."""
         return self.most if self.most is not None else self.least  # type: ignore[return-value]
 
-    def met(self, low: float, high: float) -> bool:
+    def is_met(self, low: float, high: float) -> bool:
         """Return whether an interval (or a value, given twice) lies within the limit."""
         return high <= self.limit if self.most is not None else low >= self.limit
 
-    def asked(self) -> str:
+    def describe_limit(self) -> str:
         """Return ``at most 0.3``, with the unit."""
         return f"at {'most' if self.most is not None else 'least'} {self.limit:g} {self.unit}"
 
@@ -170,7 +170,7 @@ class EvidenceCase:
     sensitivity: tuple[tuple[SensitivityKey, Any, str], ...] = ()
 
     @property
-    def assessed(self) -> Study:
+    def system_study(self) -> Study:
         """The study of the system itself."""
         return self.studies[ASSESSED]
 
@@ -199,7 +199,7 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
             raise SceneError(
                 [file.problem(("requirements", index, "name"), "is given twice", name)]
             )
-    studies = {ASSESSED: _assessed(file, tables, replicas)}
+    studies = {ASSESSED: _load_system_study(file, tables, replicas)}
     for index, one in enumerate(tables.beside):
         if one.name in {*studies, SENSITIVITY}:
             raise SceneError([file.problem(("beside", index, "name"), "is given twice", one.name)])
@@ -222,7 +222,7 @@ def _set_of_system(tables: CaseTables) -> list[str]:
     return [f"set.{key}={set_text(value)}" for key, value in flat(tables.set).items()]
 
 
-def _assessed(file: SceneFile, tables: CaseTables, replicas: int | None) -> Study:
+def _load_system_study(file: SceneFile, tables: CaseTables, replicas: int | None) -> Study:
     sets = [f"replicas={replicas}"] if replicas else []
     study = read_study(tables.study, sets=[*sets, *_set_of_system(tables)])
     if len(study.cells) != 1:
@@ -249,7 +249,7 @@ def _sensitivity(
             result = result[part]
         stated[one.key] = result
     varied = tuple(
-        (one, value, f"{one.key} = {written(value)}")
+        (one, value, f"{one.key} = {case_value(value)}")
         for one in tables.sensitivity for value in one.values
     )  # fmt: skip
     columns = {
@@ -266,9 +266,9 @@ def _sensitivity(
     return varied, read_study(tables.study, sets=_set_of_system(tables), keys=keys)
 
 
-def written(value: Any) -> str:
+def case_value(value: Any) -> str:
     """Return a value as a case's lines show it: as a scene would hold it."""
-    return set_text(value) if isinstance(value, list | dict) else as_text(value)
+    return set_text(value) if isinstance(value, list | dict) else format_value(value)
 
 
 def _check_results(case: EvidenceCase) -> None:
@@ -285,7 +285,7 @@ def _check_results(case: EvidenceCase) -> None:
             message = f"the case has no such study{did_you_mean(study, known)}"
             case.file.report((*at, "study"), message, study)
             continue
-        known = [r.name for r in case.results[study].values() if r.summed_up]
+        known = [r.name for r in case.results[study].values() if r.is_summarised]
         if name not in known:
             message = f"the study gives no such result{did_you_mean(name, known)}"
             case.file.report((*at, "result") if inside else at, message, name)
@@ -310,7 +310,7 @@ def _check_limit(case: EvidenceCase, at: tuple[str, int], study: str, result: st
 
 def _check_sources(case: EvidenceCase) -> None:
     """Report every block whose scene states a value that no source covers."""
-    sources, scene = case.tables.sources, case.assessed.scene(0)
+    sources, scene = case.tables.sources, case.system_study.scene(0)
     for key in flat(sources):
         parts = key.removeprefix("blocks.").split(".")
         if parts[0] not in {*scene.blocks, WIRES}:

@@ -28,7 +28,9 @@ def draw_convergence(findings: Sequence[Finding], confidence: float) -> bytes:
             axes.fill_between(c.counts, low, high, color=_BAND, alpha=0.35, lw=0,
                               label=f"{100 * confidence:g} % interval")  # fmt: skip
             axes.plot(c.counts, value, color=_LINE, label="running estimate")
-            axes.axhline(asked.limit, color=_LIMIT, ls="--", label=f"asked: {asked.asked()}")
+            axes.axhline(
+                asked.limit, color=_LIMIT, ls="--", label=f"asked: {asked.describe_limit()}"
+            )
             if math.isfinite(value[-1]):
                 span = [c.last_from, c.counts[-1]]
                 for side in (-1.0, 1.0):

@@ -15,7 +15,7 @@ from dsa_des.evidence.case import (
     SENSITIVITY,
     CaseRequirement,
     EvidenceCase,
-    written,
+    case_value,
 )
 from dsa_des.results.record import Result
 from dsa_des.results.statistics import Estimate
@@ -61,10 +61,10 @@ class Finding:
         e, asked = self.line.estimate, self.requirement
         if not self.convergence.holds or math.isnan(e.low) or math.isnan(e.high):
             return NOT_KNOWN
-        if asked.met(e.low, e.high):
+        if asked.is_met(e.low, e.high):
             return MET
         far = e.low if asked.most is not None else e.high
-        return NOT_SHOWN if asked.met(far, far) else NOT_MET
+        return NOT_SHOWN if asked.is_met(far, far) else NOT_MET
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class ParameterChange:
 
 
 def findings_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[Finding]:
-    """Return what every requirement comes to."""
+    """Return the finding for every requirement."""
     findings = []
     for one in case.tables.requirements:
         mine = tables[one.study]
@@ -132,7 +132,7 @@ def changes_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[Paramet
     mine = tables[SENSITIVITY]
     asked = {one.result: one for one in case.tables.requirements if one.study == ASSESSED}
     labels = {label: (key, value) for key, value, label in case.sensitivity}
-    stated = _stated(case)
+    stated = _stated_values(case)
     changes = []
     for item in mine.compared:
         if item.result.name not in asked or item.value not in labels:
@@ -153,12 +153,12 @@ def changes_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[Paramet
     return sorted(changes, key=lambda one: -largest[one.key])
 
 
-def _stated(case: EvidenceCase) -> dict[str, str]:
+def _stated_values(case: EvidenceCase) -> dict[str, str]:
     """Return the value of every changed parameter as the case states it."""
     study = case.studies[SENSITIVITY]
     (axis,) = [axis for axis in study.axes if axis.key == CHANGED]
     index = axis.labels.index(AS_STATED)
-    return {key: written(value) for key, value in axis.sets[index]}
+    return {key: case_value(value) for key, value in axis.sets[index]}
 
 
 def first_line(findings: Sequence[Finding]) -> str:
@@ -170,16 +170,17 @@ def first_line(findings: Sequence[Finding]) -> str:
         return "No verdict: " + "; ".join(_unknown(one) for one in by[NOT_KNOWN]) + "."
     parts = []
     if fails := [*by.get(NOT_MET, []), *by.get(NOT_SHOWN, [])]:
-        parts.append("Does not pass: " + "; ".join(map(_told, fails)) + ".")
+        parts.append("Does not pass: " + "; ".join(map(_describe_finding, fails)) + ".")
     if passes := by.get(MET, []):
-        parts.append("Passes: " + "; ".join(map(_told, passes)) + ".")
+        parts.append("Passes: " + "; ".join(map(_describe_finding, passes)) + ".")
     return " ".join(parts)
 
 
-def _told(one: Finding) -> str:
+def _describe_finding(one: Finding) -> str:
     e, asked = one.line.estimate, one.requirement
     shown = ", not shown: the interval holds the limit" if one.verdict == NOT_SHOWN else ""
-    return f"{asked.name} {e.value:.3g} ({e.low:.3g} to {e.high:.3g}), asked {asked.asked()}{shown}"
+    interval = f"{e.value:.3g} ({e.low:.3g} to {e.high:.3g})"
+    return f"{asked.name} {interval}, asked {asked.describe_limit()}{shown}"
 
 
 def _unknown(one: Finding) -> str:

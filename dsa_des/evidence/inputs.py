@@ -9,7 +9,7 @@ from typing import Any
 
 from dsa_des.block.ladder import Verified
 from dsa_des.block.shipped_files import folders
-from dsa_des.evidence.case import WIRES, EvidenceCase, source_of, wires_with_options, written
+from dsa_des.evidence.case import WIRES, EvidenceCase, case_value, source_of, wires_with_options
 from dsa_des.results.folder import StudyFolder
 from dsa_des.scene.scene_file import COMMAND_LINE, read_scene_file
 from dsa_des.studies.draws import file_digest
@@ -31,7 +31,7 @@ class CaseFiles:
     #: Name of the case's own file.
     case: str
 
-    def shown(self, text: str) -> str:
+    def relative_name(self, text: str) -> str:
         """Return a text that is a path of the case as a name below the root."""
         path = Path(os.path.abspath(text))
         if path in self.names:
@@ -64,11 +64,11 @@ def files_of_case(case: EvidenceCase) -> CaseFiles:
     home = next((folder for folder in shipped if own.is_relative_to(folder)), None)
     mine = [p for p in paths if not any(p.is_relative_to(folder) for folder in shipped)]
     root = home or Path(os.path.commonpath([path.parent for path in mine]))
-    names = {path: _below(path, [root, *shipped]) for path in sorted(paths)}
+    names = {path: _name_below(path, [root, *shipped]) for path in sorted(paths)}
     return CaseFiles(root, names, names[own])
 
 
-def _below(path: Path, folders: Iterable[Path]) -> str:
+def _name_below(path: Path, folders: Iterable[Path]) -> str:
     """Return a file's name below the first of some folders that holds it, or its last part."""
     inside = [folder for folder in folders if path.is_relative_to(folder)]
     return path.relative_to(inside[0]).as_posix() if inside else path.name
@@ -80,7 +80,7 @@ def _paths(sources: Iterable[str]) -> list[Path]:
 
 def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
     """Return every parameter of the system's blocks: value, meaning, where written, its source."""
-    study = case.assessed
+    study = case.system_study
     scene = study.scene(0)
     changed = {key.removeprefix("blocks.") for key, _ in study.sets}
     rows = []
@@ -90,12 +90,14 @@ def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
         for key, value in values.items():
             where = DEFAULT
             if key in block.parameters.model_fields_set:
-                where = files.shown(study.base.source_of(("blocks", name, key)))
+                where = files.relative_name(study.base.source_of(("blocks", name, key)))
             if any(f"{one}.".startswith(f"{name}.{key}.") for one in changed):
                 where = "the study or the case"
             rows.append({
                 "key": f"{name}.{key}",
-                "value": files.shown(value) if isinstance(value, str) else written(value),
+                "value": (
+                    files.relative_name(value) if isinstance(value, str) else case_value(value)
+                ),
                 "meaning": (fields[key].description or "") if key in fields else "",
                 "written_in": where,
                 "source": source_of(case.tables.sources, name, key) if where != DEFAULT else None,
@@ -104,9 +106,9 @@ def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
         way = f"{wire.pop('from')} -> {wire.pop('to')}"
         rows.append({
             "key": f"{WIRES}.{way}",
-            "value": ", ".join(f"{key} = {written(value)}" for key, value in wire.items()),
+            "value": ", ".join(f"{key} = {case_value(value)}" for key, value in wire.items()),
             "meaning": "What the wire does to messages.",
-            "written_in": files.shown(study.base.source_of((WIRES,))),
+            "written_in": files.relative_name(study.base.source_of((WIRES,))),
             "source": source_of(case.tables.sources, WIRES, way),
         })  # fmt: skip
     return rows

@@ -64,17 +64,17 @@ class Pack:
             "system": tables.system.model_dump(),
             "requirements": [self._requirement(one) for one in self.findings],
             "also": [numbers_of(line) for name in tables.also for line in self._lines(name)],
-            "beside": [self._beside(one.name, one.about) for one in tables.beside],
+            "beside": [self._describe_beside(one.name, one.about) for one in tables.beside],
             "sample": self._sample(),
             "convergence": {
                 "rule": tables.convergence.text(),
                 "estimates": [_running(one) for one in self.findings],
             },
-            "sensitivity": [_changed(one) for one in self.changes],
+            "sensitivity": [_change_as_dict(one) for one in self.changes],
             "sensitivity_encounters": self._units(SENSITIVITY),
             "parameters": parameters_of(self.case, self.files),
-            "models": models_of(self.case.assessed),
-            "left_out": self._left_out(),
+            "models": models_of(self.case.system_study),
+            "left_out": self._omissions(),
             "seeds": {name: study.seed for name, study in self.case.studies.items()},
             "inputs": self.files.digests(),
             "results": [
@@ -109,7 +109,7 @@ class Pack:
             "converged": one.convergence.holds, "verdict": one.verdict,
         }  # fmt: skip
 
-    def _beside(self, name: str, about: str) -> dict[str, Any]:
+    def _describe_beside(self, name: str, about: str) -> dict[str, Any]:
         wanted = [one.result for one in self.case.tables.requirements if one.study == ASSESSED]
         wanted += self.case.tables.also
         numbers = [numbers_of(line) for one in wanted for line in self._lines(one, name)]
@@ -124,7 +124,7 @@ class Pack:
             "drawn": [draw.key for draw in self.tables[ASSESSED].record.draws],
         }  # fmt: skip
 
-    def _left_out(self) -> dict[str, Any]:
+    def _omissions(self) -> dict[str, Any]:
         explained = read_explained(self.folders[ASSESSED])
         scene = explained.scenes[0] if explained and explained.scenes else None
         return {
@@ -146,7 +146,7 @@ def _running(one: Finding) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _changed(one: ParameterChange) -> dict[str, Any]:
+def _change_as_dict(one: ParameterChange) -> dict[str, Any]:
     d = one.difference
     return {
         "key": one.key, "unit": one.unit, AS_STATED.replace(" ", "_"): one.stated,

@@ -24,7 +24,7 @@ def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes |
     names = list(dict.fromkeys(line["result"] for line in lines if line.get("study") in
                                (None, "assessed")))  # fmt: skip
     page = page_environment().from_string(_PAGE).render(
-        e=e, title=e["case"]["title"], verdict=_whole(e["verdict"]["line"]),
+        e=e, title=e["case"]["title"], verdict=_escape_whole(e["verdict"]["line"]),
         level=f"{100 * confidence:g} %",
         requirements=[
             (r["name"], f"at {r['sense']} {r['limit']:g} {r['unit']}", _number(r["value"]),
@@ -40,7 +40,7 @@ def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes |
         ],
         also=[(readable(r["result"]), _number(r["value"]), _interval(r), r["meaning"])
               for r in e["also"]],
-        beside_heads=("system", *map(readable, names)), beside=_beside(e, names),
+        beside_heads=("system", *map(readable, names)), beside=_comparison_rows(e, names),
         sample=[
             ("model", e["sample"]["model"]), ("licence", e["sample"]["licence"]),
             ("weights", e["sample"]["weights"]), ("encounters", e["sample"]["encounters"]),
@@ -60,7 +60,7 @@ def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes |
         ],
         convergence=base64.b64encode(convergence).decode(),
         sensitivity=base64.b64encode(sensitivity or b"").decode(),
-        stated=_stated([p for p in e["parameters"] if p["written_in"] != DEFAULT]),
+        stated=_parameter_rows([p for p in e["parameters"] if p["written_in"] != DEFAULT]),
         defaults=[(p["key"], p["value"], p["meaning"])
                   for p in e["parameters"] if p["written_in"] == DEFAULT],
         verified=[
@@ -79,12 +79,12 @@ def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes |
     return page.encode()
 
 
-def _whole(text: str) -> Markup:
+def _escape_whole(text: str) -> Markup:
     """Return a text as it is, however long: what does not pass is not cut."""
     return Markup(escape(printable(text)))
 
 
-def _stated(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
+def _parameter_rows(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
     """Return block, the source of most of its values, and its rows, whose own source may differ."""
     by: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
@@ -101,7 +101,7 @@ def _stated(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
     return blocks
 
 
-def _beside(e: Mapping[str, Any], names: list[str]) -> list[tuple[str, ...]]:
+def _comparison_rows(e: Mapping[str, Any], names: list[str]) -> list[tuple[str, ...]]:
     """Return a row for the system and for each study beside it, with a column per result."""
     own = [r for r in (*e["requirements"], *e["also"]) if r.get("study") in (None, "assessed")]
     rows = [(e["system"]["name"], own)] + [(one["name"], one["results"]) for one in e["beside"]]

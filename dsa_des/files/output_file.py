@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from dsa_des.errors import UsageError
-from dsa_des.files.output_names import reason_of, why_no_name
-from dsa_des.terminal.interruption import deferred
+from dsa_des.files.output_names import name_refusal, reason_of
+from dsa_des.terminal.interruption import defer_signals
 
 #: Endings of the pictures that are drawn.
 PICTURES = (".png",)
@@ -28,7 +28,7 @@ def write_file(path: Path, content: bytes, *, to_disk: bool = False) -> None:
     A link that stands there is replaced; what it points to stays as it is. `to_disk` has the
     content on the disk before it takes its name, so that it is whole even after a loss of power.
     """
-    with streamed(path) as stream:
+    with stream_file(path) as stream:
         stream.write(content)
         if to_disk:
             stream.flush()
@@ -36,9 +36,9 @@ def write_file(path: Path, content: bytes, *, to_disk: bool = False) -> None:
 
 
 @contextmanager
-def streamed(path: Path) -> Iterator[BinaryIO]:
+def stream_file(path: Path) -> Iterator[BinaryIO]:
     """Give a file to write to, which takes its name when the block ends well; see `write_file`."""
-    temporary = temporary_beside(path)
+    temporary = temporary_path(path)
     try:
         with open(temporary, "xb") as stream:
             yield stream
@@ -56,15 +56,15 @@ def check_file(path: Path, option: str = "--out") -> None:
 
     Files that a killed process has left half-written beside it are removed.
     """
-    if reason := why_no_name(path):
+    if reason := name_refusal(path):
         raise UsageError(f"{option} {path}: {reason}")
     try:
         if not path.parent.is_dir():
             raise UsageError(f"{option} {path}: there is no folder {path.parent}")
-        if reason := _why_no_file(path):
+        if reason := _refusal_of_file(path):
             raise UsageError(f"{option} {path}: {reason}; the name of a file is needed")
-        remove_left_over(path.parent)
-        trial = temporary_beside(path)
+        remove_abandoned(path.parent)
+        trial = temporary_path(path)
         with open(trial, "xb"):
             pass
         trial.unlink()
@@ -81,7 +81,7 @@ def check_ending(path: Path, endings: Sequence[str], option: str = "--out") -> N
         )
 
 
-def _why_no_file(path: Path) -> str | None:
+def _refusal_of_file(path: Path) -> str | None:
     """Return why no file may be written here, if so; devices would be replaced by it."""
     folder = Path(os.path.realpath(path.parent))
     above = {str(one) for one in (folder, *folder.parents)}
@@ -113,7 +113,7 @@ _OLD_S = 3600.0
 
 
 @contextmanager
-def unfinished(target: Path) -> Iterator[Path]:
+def temporary_folder(target: Path) -> Iterator[Path]:
     """Give an empty folder beside `target`, on the same file system; it is gone afterwards.
 
     Parents of `target` that do not exist are made; those that are empty at the end are removed.
@@ -122,12 +122,12 @@ def unfinished(target: Path) -> Iterator[Path]:
     folder: Path | None = None
     lock: int | None = None
     try:
-        with deferred():
-            remove_left_over(target.parent)
+        with defer_signals():
+            remove_abandoned(target.parent)
             folder, lock = _new_folder(target)
         yield folder
     finally:
-        with deferred():
+        with defer_signals():
             if folder is not None:
                 shutil.rmtree(folder, ignore_errors=True)
             if lock is not None:
@@ -137,7 +137,7 @@ def unfinished(target: Path) -> Iterator[Path]:
                     parent.rmdir()
 
 
-def temporary_beside(path: Path) -> Path:
+def temporary_path(path: Path) -> Path:
     """Return a name beside `path` that nothing has, for what is not finished."""
     return path.parent / f"{PREFIX}{os.urandom(6).hex()}"
 
@@ -146,14 +146,14 @@ def _new_folder(target: Path) -> tuple[Path, int | None]:
     for _ in range(_TRIES):
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
-            folder = temporary_beside(target)
+            folder = temporary_path(target)
             folder.mkdir(0o700)
             lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
         except FileNotFoundError:  # a clean-up took the folder or its parent away
             continue
         try:
-            os.write(lock, json.dumps(_about(target)).encode())
-            if locked(lock) is False or not _is_at(lock, folder / _LOCK):
+            os.write(lock, json.dumps(_process_marker(target)).encode())
+            if lock_file(lock) is False or not _is_same_file(lock, folder / _LOCK):
                 os.close(lock)
                 continue
         except BaseException:
@@ -164,7 +164,7 @@ def _new_folder(target: Path) -> tuple[Path, int | None]:
     raise FileNotFoundError(f"no folder can be made in {target.parent}")
 
 
-def _about(target: Path) -> dict[str, Any]:
+def _process_marker(target: Path) -> dict[str, Any]:
     return {"dsa_des": _WHAT, "host": _host(), "target": target.name}
 
 
@@ -172,7 +172,7 @@ def _host() -> str:
     return os.uname().nodename if hasattr(os, "uname") else ""
 
 
-def locked(file: int) -> bool | None:
+def lock_file(file: int) -> bool | None:
     """Lock an open file; False if another process has it, None if it cannot be locked at all."""
     if fcntl is None:
         return None
@@ -185,14 +185,14 @@ def locked(file: int) -> bool | None:
     return True
 
 
-def _is_at(file: int, path: Path) -> bool:
+def _is_same_file(file: int, path: Path) -> bool:
     try:
         return os.path.samestat(os.fstat(file), os.stat(path, follow_symlinks=False))
     except OSError:
         return False
 
 
-def remove_left_over(parent: Path) -> None:
+def remove_abandoned(parent: Path) -> None:
     """Remove what killed processes of this user on this machine have left in a folder."""
     if fcntl is None:
         return
@@ -203,19 +203,19 @@ def remove_left_over(parent: Path) -> None:
                 continue
             with suppress(OSError):
                 if entry.is_dir(follow_symlinks=False):
-                    _remove_if_left_over(Path(entry.path))
+                    _remove_abandoned(Path(entry.path))
                 elif time.time() - about.st_mtime > _OLD_S:
                     os.unlink(entry.path)
 
 
-def _remove_if_left_over(folder: Path) -> None:
+def _remove_abandoned(folder: Path) -> None:
     try:
         lock = os.open(folder / _LOCK, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
     except FileNotFoundError:
         folder.rmdir()  # its maker was killed at once, or makes another one
         return
     try:
-        if not locked(lock):
+        if not lock_file(lock):
             return
         content = os.read(lock, 1 << 16)
         if not content and os.listdir(folder) == [_LOCK]:

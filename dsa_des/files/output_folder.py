@@ -14,17 +14,17 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.files.output_file import EARLIER, unfinished
+from dsa_des.files.output_file import EARLIER, temporary_folder
 from dsa_des.files.output_names import (
     check_place,
     claim_folder,
+    describe_write_error,
     location_of,
-    named,
     new_folder_name,
     reason_of,
-    why_not_written,
+    user_path,
 )
-from dsa_des.terminal.interruption import deferred
+from dsa_des.terminal.interruption import defer_signals
 
 #: A run folder's own description: its version, its scene, and all its files.
 RUN_JSON = "run.json"
@@ -38,14 +38,14 @@ def with_files(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
     return {**content, _FILES: files}
 
 
-def foreign_in(folder: Path) -> list[str]:
+def foreign_files(folder: Path) -> list[str]:
     """Return what of a folder dsa_des did not write, by its name in the folder, sorted.
 
     All of it if the folder holds no ``run.json`` of ours; nothing if it is empty. A file that was
     changed since is not what we wrote.
     """
     names = list(_names(folder))
-    files = _listed(folder / RUN_JSON)
+    files = _read_listing(folder / RUN_JSON)
     if files is None:
         return names
     return [
@@ -55,7 +55,7 @@ def foreign_in(folder: Path) -> list[str]:
     ]
 
 
-def _listed(path: Path) -> dict[str, str] | None:
+def _read_listing(path: Path) -> dict[str, str] | None:
     try:
         if not stat.S_ISREG(path.lstat().st_mode):
             return None
@@ -105,14 +105,14 @@ class OutputFolder:
         self.path = path if stem is None else new_folder_name(path, stem)
 
     @classmethod
-    def chosen(cls, out: str | None, parent: Path, stem: str) -> "OutputFolder":
+    def from_option(cls, out: str | None, parent: Path, stem: str) -> "OutputFolder":
         """Return what ``--out`` names, or else the next free ``parent/stem-NNN``."""
-        return cls(parent, stem) if out is None else cls(named(out))
+        return cls(parent, stem) if out is None else cls(user_path(out))
 
     def check(self) -> None:
         """Raise UsageError unless the results can go there."""
         check_place(self.path)
-        if self._stem is None and (reason := _why_kept(location_of(self.path))):
+        if self._stem is None and (reason := _replace_refusal(location_of(self.path))):
             raise UsageError(f"--out {self.path}: {reason}; choose a new name")
 
     @contextmanager
@@ -126,12 +126,12 @@ class OutputFolder:
         before = _identity(path)
         ready = False
         try:
-            with unfinished(path) as folder:
+            with temporary_folder(path) as folder:
                 results = folder / _RESULTS
                 results.mkdir()
                 ready = True
                 yield results
-                with deferred():
+                with defer_signals():
                     if self._stem is not None:
                         self._take_number(results, path.parent)
                     else:
@@ -140,7 +140,7 @@ class OutputFolder:
             raise
         except OSError as error:
             if not ready:
-                why = why_not_written(error, path)
+                why = describe_write_error(error, path)
                 raise UsageError(f"--out {self.path}: cannot be written: {why}") from error
             raise OutputError(
                 f"{self.path}: the results cannot be written: {reason_of(error)}"
@@ -191,7 +191,7 @@ def new_folder(out: str | None, parent: Path, stem: str) -> Iterator[Path]:
 
     It is what ``--out`` names, which must be new or empty, or the next free ``parent/stem-NNN``.
     """
-    folder = parent / stem if out is None else named(out)
+    folder = parent / stem if out is None else user_path(out)
     made = [above for above in folder.parents if not os.path.lexists(above)]
     if out is None:
         folder = claim_folder(parent, stem)
@@ -201,7 +201,7 @@ def new_folder(out: str | None, parent: Path, stem: str) -> Iterator[Path]:
     try:
         yield folder
     finally:
-        with deferred():
+        with defer_signals():
             for one in made:
                 with suppress(OSError):
                     one.rmdir()
@@ -216,7 +216,7 @@ def _make(folder: Path) -> bool:
         new = not folder.exists()
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        why = why_not_written(error, folder)
+        why = describe_write_error(error, folder)
         raise UsageError(f"--out {folder}: cannot be written: {why}") from error
     return new
 
@@ -227,17 +227,17 @@ def _move_aside(path: Path, earlier: Path) -> str | None:
         path.rename(earlier)
     except OSError as error:
         return f"cannot be replaced: {reason_of(error)}"
-    if reason := _why_kept(earlier):
+    if reason := _replace_refusal(earlier):
         earlier.rename(path)
     return reason
 
 
-def _why_kept(path: Path) -> str | None:
+def _replace_refusal(path: Path) -> str | None:
     """Return why a folder must not be replaced, if so."""
     if not os.path.lexists(path):
         return None
     try:
-        foreign = foreign_in(path)
+        foreign = foreign_files(path)
     except OSError as error:
         return f"cannot be read: {reason_of(error)}"
     if not foreign:

@@ -18,11 +18,11 @@ _LONGEST_INSIDE = 64
 _MOUNTS = Path("/proc/self/mountinfo")
 
 
-def named(text: str, option: str = "--out") -> Path:
+def user_path(text: str, option: str = "--out") -> Path:
     """Return the path that a user wrote, with ``~`` for the home folder."""
     if not text.strip():
         raise UsageError(f"{option} {text!r}: is empty; a name is needed")
-    if reason := why_no_name(text):
+    if reason := name_refusal(text):
         raise UsageError(f"{option} {text!r}: {reason}")
     if not text.startswith("~"):
         return Path(text)
@@ -35,7 +35,7 @@ def named(text: str, option: str = "--out") -> Path:
         ) from None
 
 
-def why_no_name(path: str | Path) -> str | None:
+def name_refusal(path: str | Path) -> str | None:
     """Return why no file can have this name, if so."""
     text = os.fspath(path)
     if "\0" in text:
@@ -52,7 +52,7 @@ def reason_of(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno else str(error)
 
 
-def why_not_written(error: OSError, path: Path) -> str:
+def describe_write_error(error: OSError, path: Path) -> str:
     """Return the reason of a system error at a path that was to be made or written into.
 
     Some file systems (``/proc``) take no folder and call it missing: what is there is named.
@@ -86,7 +86,7 @@ def claim_folder(parent: Path, stem: str) -> Path:
                 continue
             raise UsageError(f"{parent}: is no folder") from None
         except OSError as error:
-            why = why_not_written(error, folder)
+            why = describe_write_error(error, folder)
             raise UsageError(f"{folder}: cannot be written: {why}") from error
         return folder
 
@@ -103,19 +103,19 @@ def check_place(folder: Path, option: str = "--out") -> None:
 
     What is in a folder that is there is not looked at.
     """
-    if reason := why_no_name(folder):
+    if reason := name_refusal(folder):
         raise UsageError(f"{option} {folder}: {reason}")
     try:
         if ".." in folder.parts:
             folder.parent.lstat()  # it must be there: .. leads out of nothing that is not
-        reason = _why_no_place(location_of(folder))
+        reason = _place_refusal(location_of(folder))
     except OSError as error:
         reason = f"cannot be written: {reason_of(error)}"
     if reason is not None:
         raise UsageError(f"{option} {folder}: {reason}")
 
 
-def _why_no_place(path: Path) -> str | None:
+def _place_refusal(path: Path) -> str | None:
     try:
         kind = path.lstat().st_mode
     except FileNotFoundError:
@@ -125,7 +125,7 @@ def _why_no_place(path: Path) -> str | None:
         return f"is a symbolic link to {os.readlink(path)}; name a folder"
     if not stat.S_ISDIR(kind):
         return "is a file; a folder name is needed"
-    for what, kept in _kept_folders():
+    for what, kept in _protected_folders():
         if path == kept or path in kept.parents:
             return f"{'is' if path == kept else 'holds'} {what}; name a folder inside it"
     if os.path.ismount(path) or str(path) in _mount_points():
@@ -146,7 +146,7 @@ def _raise_if_too_long(location: Path) -> None:
             path.lstat()
 
 
-def _kept_folders() -> list[tuple[str, Path]]:
+def _protected_folders() -> list[tuple[str, Path]]:
     """Return folders that are never replaced, and neither is what holds them."""
     home = os.path.realpath(os.path.expanduser("~"))
     return [("the working directory", Path.cwd()), ("your home folder", Path(home))]

@@ -72,7 +72,7 @@ def parquet(table: "pa.Table", about: bytes = b"") -> bytes:
     return buffer.getvalue()
 
 
-def sealed(content: bytes, owner: str) -> bytes:
+def seal(content: bytes, owner: str) -> bytes:
     """Return a file of `parquet` with its digest; `owner` says whose it is."""
     index = _seal_start(content)
     if index is None:

@@ -24,7 +24,7 @@ _WITHOUT = re.compile(
 
 
 def toml_reason(error: Exception) -> str:
-    """Return what a ``TOMLDecodeError`` says and where, without what stands there.
+    """Return the message and line of a ``TOMLDecodeError``, without the line's text.
 
     A file that is no scene may hold secrets, so it is not quoted.
     """
@@ -58,9 +58,9 @@ def parse_toml(text: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise NotToml(f"is not valid TOML: {toml_reason(error)}") from None
     except RecursionError:
-        raise TomlError(_too_deep()) from None
+        raise TomlError(_depth_message()) from None
     except ValueError:  # Python's own limit on the digits of an integer
-        raise TomlError(_too_long()) from None
+        raise TomlError(_length_message()) from None
     _refuse_extremes(tables)
     return tables
 
@@ -75,18 +75,18 @@ def _refuse_extremes(tables: dict[str, Any]) -> None:
                 if isinstance(value, dict | list):
                     below.append(value)
                 elif isinstance(value, int) and abs(value) >= _LARGEST_WHOLE:
-                    raise TomlError(_too_long())
+                    raise TomlError(_length_message())
         if not below:
             return
         level = below
-    raise TomlError(_too_deep())
+    raise TomlError(_depth_message())
 
 
-def _too_deep() -> str:
+def _depth_message() -> str:
     return f"tables and lists are nested too deeply: at most {DEEPEST} inside each other"
 
 
-def _too_long() -> str:
+def _length_message() -> str:
     return f"a whole number has too many digits: at most {MOST_DIGITS} are allowed"
 
 

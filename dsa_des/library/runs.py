@@ -11,7 +11,7 @@ from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_files import to_toml
 from dsa_des.library.scenes import scene_of_any
-from dsa_des.record.drawing import kept_figures
+from dsa_des.record.drawing import keep_figures
 from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import Run, read_run
@@ -59,8 +59,8 @@ def run(
     """
     loaded = scene_of_any(scene)
     if out is None:
-        return _in_memory(loaded, simulate_everything, progress)
-    target = OutputFolder.chosen(os.fspath(out), Path("runs"), loaded.path.stem)
+        return _run_in_memory(loaded, simulate_everything, progress)
+    target = OutputFolder.from_option(os.fspath(out), Path("runs"), loaded.path.stem)
     record_run(
         loaded,
         target,
@@ -71,7 +71,7 @@ def run(
     return read_run(target.path)
 
 
-def _in_memory(
+def _run_in_memory(
     scene: Scene, simulate_everything: bool, progress: Callable[[float], None] | None
 ) -> Run:
     tables = MemorySink()
@@ -92,11 +92,11 @@ def _in_memory(
     if noted or notes:
         info["notes"] = [*noted, *notes]
     said = notes_of(simulation.recorded_messages(), text, scene.seed, simulation.ticks_per_s)
-    arrow = said.on(tables.tables())
-    return Run(None, info, arrow, text, lambda: _drawn(reports, simulation, arrow, summary))
+    arrow = said.attach(tables.tables())
+    return Run(None, info, arrow, text, lambda: _draw_reports(reports, simulation, arrow, summary))
 
 
-def _drawn(
+def _draw_reports(
     reports: list[Report], simulation: Simulation, tables: dict[str, Any], summary: dict[str, Any]
 ) -> dict[str, Any]:
     """Return what reports draw of a run in memory: they read its tables from a folder."""
@@ -106,7 +106,7 @@ def _drawn(
         folder = Path(path)
         for name, table in tables.items():
             pq.write_table(table, folder / f"{name}.parquet")
-        with kept_figures() as result:
+        with keep_figures() as result:
             notes = draw_all(reports, simulation, folder, summary)
     if notes and not result:
         raise UsageError("; ".join(notes))

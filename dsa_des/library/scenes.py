@@ -58,7 +58,7 @@ def _tables_of(source: str | os.PathLike[str] | Mapping[str, Any]) -> SceneFile:
         try:
             return read_scene_tables(scene_value(source), _TABLE)
         except TypeError as error:
-            raise SceneError([_what_is_wrong(source, str(error))]) from None
+            raise SceneError([_explain_tables(source, str(error))]) from None
     if not isinstance(source, str | os.PathLike):
         message = "must be a path, the name of a shipped scene, or a table"
         raise SceneError([Problem("load_scene", "", message, source)])
@@ -74,7 +74,7 @@ def _tables_of(source: str | os.PathLike[str] | Mapping[str, Any]) -> SceneFile:
     return read_scene_file(path)
 
 
-def _what_is_wrong(tables: Mapping[str, Any], message: str, key: str = "") -> Problem:
+def _explain_tables(tables: Mapping[str, Any], message: str, key: str = "") -> Problem:
     """Return which value of some tables is none of a scene."""
     for name, value in tables.items():
         inner = f"{key}.{name}" if key else str(name)
@@ -82,7 +82,7 @@ def _what_is_wrong(tables: Mapping[str, Any], message: str, key: str = "") -> Pr
             try:
                 scene_value(value)
             except TypeError:
-                return _what_is_wrong(value, message, inner)
+                return _explain_tables(value, message, inner)
             continue
         try:
             scene_value(value)

@@ -13,12 +13,12 @@ from weakref import finalize
 from dsa_des.block.registry import classes_in
 from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.library.scenes import scene_of_any
-from dsa_des.record.drawing import kept_figures, pictures_in
+from dsa_des.record.drawing import keep_figures, pictures_in
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.printing import show
 from dsa_des.results.tables import DIFFERENCES, SUMMARY
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.overrides import SWAP, Change, apply_changes, scene_value
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
@@ -29,7 +29,7 @@ from dsa_des.studies.runner import Progress, Stopped, draw_run, run_study, table
 from dsa_des.studies.study import Study, changed_scene, command_of
 from dsa_des.studies.study_file import read_study, study_of_tables
 from dsa_des.terminal.terminal import html_of, text_of
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -82,7 +82,7 @@ class StudyResult:
     @cached_property
     def figures(self) -> dict[str, Any]:
         """All figures by name."""
-        with kept_figures() as drawn:
+        with keep_figures() as drawn:
             draw_figures(self._tables, (), partial(draw_run, self._study, self._folder))
         return {**pictures_in(self._folder.path), **drawn}
 
@@ -112,15 +112,15 @@ class StudyResult:
 
     def __repr__(self) -> str:
         rows = self._tables.rows
-        where = "in memory" if self._home is not None else f"in {shortened(str(self.path))}"
+        where = "in memory" if self._home is not None else f"in {shorten(str(self.path))}"
         axes = ", ".join(f"{axis.column} ({len(axis.labels)})" for axis in self._study.axes)
         results = ", ".join(result.name for result in self._tables.results)
         return "\n".join(
             [
-                f"Study {shortened(repr(self._study.title))}, {where}",
+                f"Study {shorten(repr(self._study.title))}, {where}",
                 f"  {len(rows.places) + rows.failed} runs, {rows.failed} failed",
-                f"  axes: {shortened(axes or 'none', 200)}",
-                f"  results: {shortened(results, 200)}",
+                f"  axes: {shorten(axes or 'none', 200)}",
+                f"  results: {shorten(results, 200)}",
             ]
         )
 
@@ -185,7 +185,7 @@ def study(
     if metrics is None:
         keys = {"axes": axes, "draws": draws, "replicas": replicas, "seed": seed, **more}
         described = _study_of_file(scene, {k: v for k, v in keys.items() if v is not None}, sets)
-        return _run(described, _workers(described, workers), out, resume, progress)
+        return _run_study(described, _workers(described, workers), out, resume, progress)
     if sets := list(sets):
         message = "changes a study file; a scene is changed with load_scene(..., sets=...)"
         raise SceneError([Problem("study", "sets", message, sets)])
@@ -205,7 +205,7 @@ def study(
         raise SceneError([Problem("study", key, message)])
     described = study_of_tables(tables, *_base_of(*loaded.origin))
     described.repeat = _BY_A_PROGRAM
-    return _run(described, _workers(described, workers), out, resume, progress)
+    return _run_study(described, _workers(described, workers), out, resume, progress)
 
 
 def _study_of_file(source: Any, given: Mapping[str, Any], sets: Iterable[str]) -> Study:
@@ -214,7 +214,7 @@ def _study_of_file(source: Any, given: Mapping[str, Any], sets: Iterable[str]) -
         message = "is missing: a scene is measured by metrics; only a study file names its own"
         raise SceneError([Problem("study", "metrics", message)])
     name = os.fspath(source)
-    path = chosen_file(name, "study")
+    path = find_input_file(name, "study")
     described = read_study(path, sets=(sets := list(sets)), keys=_tables(given))
     described.repeat = _BY_A_PROGRAM
     if given.keys() <= {"replicas", "seed"}:
@@ -280,7 +280,7 @@ def _workers(study: Study, workers: int | None) -> int:
     return workers or default_workers()
 
 
-def _run(
+def _run_study(
     study: Study,
     workers: int,
     out: str | os.PathLike[str] | None,

@@ -16,7 +16,7 @@ from dsa_des.arrays.column_values import (
     Text,
     in_seconds,
     is_empty,
-    nothing_in,
+    null_column,
 )
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import rows_of
@@ -71,12 +71,12 @@ def _array(values: Any, kind: str) -> pa.Array:
         count = np.count_nonzero(missing)
         if count == len(values):
             return pa.nulls(count, _TYPES[kind])
-        return _of_buffer(values, missing if count else None)
+        return _array_of_buffer(values, missing if count else None)
     dtype = np.dtype(bool) if kind == "bool" else np.dtype(np.int64)
-    return _of_buffer(np.asarray(values).astype(dtype, casting="safe", copy=False))
+    return _array_of_buffer(np.asarray(values).astype(dtype, casting="safe", copy=False))
 
 
-def _of_buffer(values: AnyArray, missing: AnyArray | None = None) -> pa.Array:
+def _array_of_buffer(values: AnyArray, missing: AnyArray | None = None) -> pa.Array:
     """Return an array of the same values, null where they are missing.
 
     ``pa.array`` imports pandas where that is installed, a fifth of a short run's time.
@@ -90,7 +90,7 @@ def _of_buffer(values: AnyArray, missing: AnyArray | None = None) -> pa.Array:
 
 def _dictionary(codes: AnyArray, names: tuple[str, ...]) -> pa.DictionaryArray:
     missing = codes < 0
-    indices = _of_buffer(codes, missing if missing.any() else None)
+    indices = _array_of_buffer(codes, missing if missing.any() else None)
     encoded = [name.encode() for name in names]
     ends = np.cumsum([0, *map(len, encoded)], dtype=np.int32)
     buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(encoded))]
@@ -98,7 +98,7 @@ def _dictionary(codes: AnyArray, names: tuple[str, ...]) -> pa.DictionaryArray:
     return pa.DictionaryArray.from_arrays(indices, words, safe=False)
 
 
-def _in_order_of_appearance(text: Text) -> pa.DictionaryArray:
+def _encode_by_appearance(text: Text) -> pa.DictionaryArray:
     """Return a text column whose dictionary holds its own names only, as they first appear.
 
     What the dictionary of a row group holds then follows from its rows alone.
@@ -115,7 +115,7 @@ def _in_order_of_appearance(text: Text) -> pa.DictionaryArray:
 
 
 def _first_rows(codes: AnyArray, names: int) -> IntArray:
-    """Return where each code stands first; the number of codes where it does not."""
+    """Return the first row of each code; the number of codes for one that does not occur."""
     count = len(codes)
     if count and names <= _FEW_NAMES:
         hits_of = [codes == name for name in range(names)]
@@ -151,7 +151,7 @@ class ParquetSink:
             text = [name for name, kind in schema.items() if kind == "text"]
             self._writers[table] = pq.ParquetWriter(
                 self._folder / f"{table}.parquet",
-                _written_schema(schema),
+                _writer_schema(schema),
                 compression="lz4",
                 use_dictionary=text,
                 write_batch_size=rows_in_group(schema),
@@ -178,7 +178,7 @@ class ParquetSink:
             return
         size = rows_in_group(self._schemas[table])
         full = count // size * size if whole else count
-        columns = {name: _joined([piece[name] for piece in pieces]) for name in pieces[0]}
+        columns = {name: _concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
         for start in range(0, full, size):
             rows = slice(start, min(start + size, full))
             self._writers[table].write_table(self._group(table, columns, rows))
@@ -192,10 +192,10 @@ class ParquetSink:
             values = columns[name]
             if isinstance(values, Text):
                 part = Text(values.codes[rows], values.names)
-                arrays.append(_in_order_of_appearance(part))
+                arrays.append(_encode_by_appearance(part))
             else:
                 arrays.append(_array(values[rows], kind))
-        return pa.Table.from_arrays(arrays, schema=_written_schema(self._schemas[table]))
+        return pa.Table.from_arrays(arrays, schema=_writer_schema(self._schemas[table]))
 
     def close(self) -> None:
         """Write what is left and close the files."""
@@ -214,17 +214,17 @@ class ParquetSink:
             writer.is_open = False
 
 
-def _written_schema(schema: Schema) -> pa.Schema:
+def _writer_schema(schema: Schema) -> pa.Schema:
     """Return the schema as the writer is given it: text as codes, which files hold as text."""
     text = pa.dictionary(pa.int32(), pa.string())
     return pa.schema([_field(n, k, text if k == "text" else _TYPES[k]) for n, k in schema.items()])
 
 
-def _joined(parts: list[Any]) -> Any:
+def _concatenate(parts: list[Any]) -> Any:
     if len(parts) == 1:
         return parts[0]
     if all(is_empty(part) for part in parts):
-        return nothing_in(sum(len(part) for part in parts))
+        return null_column(sum(len(part) for part in parts))
     if isinstance(parts[0], Text):
         # A recorder only ever adds names: the last piece knows them all.
         return Text(np.concatenate([part.codes for part in parts]), parts[-1].names)

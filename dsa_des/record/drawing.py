@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
-from dsa_des.text.safe_text import printable, shortened
+from dsa_des.text.safe_text import printable, shorten
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,7 +98,7 @@ _kept: ContextVar[dict[str, Any] | None] = ContextVar("kept figures", default=No
 
 
 @contextmanager
-def kept_figures() -> Iterator[dict[str, Any]]:
+def keep_figures() -> Iterator[dict[str, Any]]:
     """Keep what is drawn into files inside of this: the file's stem → matplotlib figure."""
     figures: dict[str, Any] = {}
     token = _kept.set(figures)
@@ -172,7 +172,7 @@ def figure_text(name: object, most: int = MOST_OF_A_LABEL) -> str:
 
     Matplotlib leaves legend entries out that begin with ``_``; a blank before it helps.
     """
-    text = shortened(name, most)
+    text = shorten(name, most)
     return f" {text}" if text.startswith("_") else text
 
 
@@ -215,11 +215,11 @@ def _make_plain(figure: "Figure") -> None:
         text.set_parse_math(False)
         shown = text.get_text()
         if not shown.isprintable() or len(shown) > _MOST_OF_A_LINE:
-            text.set_text(_cut(shown))
+            text.set_text(_shorten(shown))
 
 
-def _cut(text: str) -> str:
-    lines = [shortened(line, _MOST_OF_A_LINE) for line in text.split("\n")]
+def _shorten(text: str) -> str:
+    lines = [shorten(line, _MOST_OF_A_LINE) for line in text.split("\n")]
     if len(lines) > _MOST_LINES:
         lines = [*lines[: _MOST_LINES - 1], "…"]
     return printable("\n".join(lines), lines=True)

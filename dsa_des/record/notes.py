@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from dsa_des.block.message import Column, Message, derived
+from dsa_des.block.message import Column, Message, derive_columns
 from dsa_des.block.recorded_columns import LEADING, ON_PLATFORM
 from dsa_des.record.version import __version__
 
@@ -59,7 +59,7 @@ class Notes:
         arrow = base64.b64encode(described.serialize().to_pybytes()).decode()
         return {"table": table, **self.run, "ARROW:schema": arrow}
 
-    def on(self, tables: Mapping[str, Any]) -> "dict[str, pa.Table]":
+    def attach(self, tables: Mapping[str, Any]) -> "dict[str, pa.Table]":
         """Return Arrow tables with their metadata."""
         import pyarrow as pa
 
@@ -80,7 +80,7 @@ def notes_of(
     for message in messages:
         for table, columns in message.recorded.items():
             meanings.setdefault(table, {**LEADING, **ON_PLATFORM}).update(columns)
-        rows_of.setdefault(message.row_table, {}).update(derived(message).for_entries)
+        rows_of.setdefault(message.row_table, {}).update(derive_columns(message).for_entries)
     run = {
         "dsa_des_version": __version__,
         "seed": str(seed),

@@ -11,17 +11,18 @@ from dsa_des.arrays.column_values import (
     Schema,
     Text,
     constant,
+    is_constant,
     is_empty,
-    nothing_in,
-    of_one_value,
+    null_column,
     repeats,
 )
-from dsa_des.arrays.run_ticks import RunTicks, no_runs
+from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import Message, rows_of
 from dsa_des.block.recorded_columns import LEADING, PLATFORM
 from dsa_des.errors import nearest
 from dsa_des.record.sinks import Sink
+from dsa_des.record.text_codes import TextCodes
 from dsa_des.time.runs import Runs
 
 # Declared names that an error lists.
@@ -51,20 +52,20 @@ class DeclaredColumns:
         if known is None:
             raise ValueError(
                 f"{where} a table {table!r} that no message of the run declares"
-                f"{_nearest_and_all(table, self._columns)}{how}"
+                f"{_suggest_declared(table, self._columns)}{how}"
             )
         unknown = [name for name in names if name not in known]
         if unknown:
             raise ValueError(
                 f"{where} a column {unknown[0]!r} in table {table!r} that no message of the run "
-                f"declares{_nearest_and_all(unknown[0], known - self._leading)}{how}"
+                f"declares{_suggest_declared(unknown[0], known - self._leading)}{how}"
             )
         if "tick" not in names:
             raise ValueError(f"{where} a table {table!r} without a column 'tick'")
         self._sound[block, table] = names
 
 
-def _nearest_and_all(name: str, declared: Iterable[str]) -> str:
+def _suggest_declared(name: str, declared: Iterable[str]) -> str:
     """Return the declared name nearest to one that is not, and what is declared."""
     names = sorted(declared)
     close = nearest(name, names)
@@ -121,10 +122,10 @@ class Recorder:
         self._schemas: dict[str, Schema] = {}
         self._platforms: Mapping[str, str] = {}
         self._pending: dict[str, list[tuple[str, Columns]]] = {}
-        #: What came since `_read`, and of it what more messages of a block may join.
+        #: What came since `_build_pieces`, and of it what more messages of a block may join.
         self._groups: list[_AlikeMessages] = []
         self._open: dict[str, list[_AlikeMessages]] = {}
-        self._texts: dict[tuple[str, str], _TextCodes] = {}
+        self._texts: dict[tuple[str, str], TextCodes] = {}
         self._declared = DeclaredColumns({}, _LEADING)
         self.rows: dict[str, int] = {}
         self._ends: Runs | None = None
@@ -185,9 +186,9 @@ class Recorder:
         if self._wanted is not None and wanted.isdisjoint({*message.recorded, *message.may_hold}):
             return
         groups = self._open.get(block, [])
-        group = next((one for one in groups if one.messages[0].alike(message)), None)
+        group = next((one for one in groups if one.messages[0].is_alike(message)), None)
         if group is None:
-            first = self._checked(block, message)
+            first = self._checked_tables(block, message)
             if not (tables := frozenset(table for table, _ in first)):
                 return
             group = _AlikeMessages(block, tables, [], first)
@@ -201,29 +202,29 @@ class Recorder:
         self._noted[0] += message.size
         self._noted[1] += 1
 
-    def _checked(self, block: str, message: Message) -> list[tuple[str, Columns]]:
+    def _checked_tables(self, block: str, message: Message) -> list[tuple[str, Columns]]:
         """Return the tables of a message, all of whose columns are declared."""
         tables = list(self._tables(message))
         for table, columns in tables:
             self._declared.check(block, table, columns, type(message).__name__)
         return tables
 
-    def _read(self) -> None:
+    def _build_pieces(self) -> None:
         """Make pieces of tables of what came: a few long ones, whatever the messages' lengths."""
         groups, self._groups, self._open = self._groups, [], {}
         for block, _, messages, first in groups:
-            for table, columns in first or self._together(block, messages):
+            for table, columns in first or self._combined_tables(block, messages):
                 if table in self._pending and len(columns["tick"]):
                     self._pending[table].append((block, columns))
 
-    def _together(self, block: str, messages: list[Message]) -> list[tuple[str, Columns]]:
+    def _combined_tables(self, block: str, messages: list[Message]) -> list[tuple[str, Columns]]:
         """Return the tables of several messages; names the one that fails."""
         try:
-            return self._checked(block, type(messages[0]).concatenate(messages))
+            return self._checked_tables(block, type(messages[0]).concatenate(messages))
         except Exception:
             for message in messages:
                 try:
-                    self._checked(block, message)
+                    self._checked_tables(block, message)
                 except Exception as error:
                     raise NotRecordedError(block, message.tick) from error
             raise
@@ -254,17 +255,17 @@ class Recorder:
     def advance(self, run: int, tick: int) -> None:
         """Hand on the rows before a tick of a run, of which no more come, once there are enough."""
         if self._noted[0] >= _ROWS_AT_ONCE or self._noted[1] >= _PIECES_AT_ONCE:
-            self._hand_on_before(run, tick)
+            self._flush_before(run, tick)
 
-    def _hand_on_before(self, run: int, tick: int) -> None:
+    def _flush_before(self, run: int, tick: int) -> None:
         self._noted = [0, 0]
-        self._read()
+        self._build_pieces()
         for table, pieces in self._pending.items():
             ready: list[tuple[str, Columns]] = []
             later: list[tuple[str, Columns]] = []
             for block, columns in pieces:
                 instants = _instants(columns)
-                count = instants.before(run, tick)
+                count = instants.count_before(run, tick)
                 if count == len(instants):
                     ready.append((block, columns))
                     continue
@@ -273,20 +274,20 @@ class Recorder:
                 later.append((block, rows_of(columns, slice(count, len(instants)))))
             self._pending[table] = later
             if ready:
-                self._hand_on(table, ready)
+                self._flush_table(table, ready)
 
     def close(self) -> None:
         """Hand on everything that is left and close the sinks."""
-        self._hand_on_before(np.iinfo(np.int64).max - 1, 0)
+        self._flush_before(np.iinfo(np.int64).max - 1, 0)
         for sink in self.sinks:
             sink.close()
 
-    def _hand_on(self, table: str, pieces: list[tuple[str, Columns]]) -> None:
+    def _flush_table(self, table: str, pieces: list[tuple[str, Columns]]) -> None:
         pieces.sort(key=lambda piece: piece[0])
-        instants = RunTicks.joined([_instants(columns) for _, columns in pieces])
+        instants = RunTicks.concatenate([_instants(columns) for _, columns in pieces])
         order = instants.order()
         if self._ends is not None and self._ends.early:
-            kept = self._ends.before_ends(instants)
+            kept = self._ends.is_before_ends(instants)
             order = np.flatnonzero(kept) if order is None else order[kept[order]]
         if order is not None:
             instants = instants.take(order)
@@ -319,22 +320,22 @@ class Recorder:
         if kind == "text":
             says: dict[str, Callable[[str], str | None]]
             says = {"block": str, PLATFORM: self._platforms.get}
-            text = self._texts.setdefault((table, name), _TextCodes(name, says.get(name)))
-            codes = _joined([text.codes(block, columns) for block, columns in pieces], order)
+            text = self._texts.setdefault((table, name), TextCodes(name, says.get(name)))
+            codes = _concatenate([text.codes(block, columns) for block, columns in pieces], order)
             return Text(codes, text.names)
         given: list[Any] = [columns.get(name) for _, columns in pieces]
         if all(isinstance(values, Instants) for values in given):
-            ticks = _joined([values.ticks for values in given], order)
+            ticks = _concatenate([values.ticks for values in given], order)
             return Instants(ticks, self._ticks_per_s)
         parts = [
-            _values(self._in_seconds(values), kind, len(columns["tick"]))
+            _values(self._to_seconds(values), kind, len(columns["tick"]))
             for values, (_, columns) in zip(given, pieces, strict=True)
         ]
         if all(map(is_empty, parts)):
-            return nothing_in(len(instants))
-        return _joined(parts, order)
+            return null_column(len(instants))
+        return _concatenate(parts, order)
 
-    def _in_seconds(self, values: Any) -> Any:
+    def _to_seconds(self, values: Any) -> Any:
         """Return instants as seconds since the start of their run."""
         return values.ticks / self._ticks_per_s if isinstance(values, Instants) else values
 
@@ -343,7 +344,7 @@ class Recorder:
 _LEAST_ROWS = 16
 
 
-def _joined(parts: list[AnyArray], order: IntArray | None) -> AnyArray:
+def _concatenate(parts: list[AnyArray], order: IntArray | None) -> AnyArray:
     """Return the values of all parts in order; where all are the same, as one of them."""
     first, rows = parts[0][:1], sum(map(len, parts))
     if rows >= _LEAST_ROWS * len(parts) and all(repeats(part, first) for part in parts):
@@ -355,53 +356,14 @@ def _joined(parts: list[AnyArray], order: IntArray | None) -> AnyArray:
 def _instants(columns: Columns) -> RunTicks:
     tick: Any = columns["tick"]
     run: Any = columns.get("replica")
-    return RunTicks(no_runs(len(tick)) if run is None else run, tick)
-
-
-class _TextCodes:
-    """The names that a text column has held so far, and what its pieces' own codes become."""
-
-    def __init__(self, column: str, of_block: Callable[[str], str | None] | None) -> None:
-        #: Of each block what its rows hold; None of columns that messages fill.
-        self._column, self._of_block = column, of_block
-        self._code: dict[str, int] = {}
-        #: By identity of a tuple of names, which is kept so that the identity stays its own.
-        self._lookups: dict[int, tuple[tuple[str, ...], AnyArray]] = {}
-        self.names: tuple[str, ...] = ()
-
-    def codes(self, block: str, columns: Columns) -> AnyArray:
-        """Return one piece's codes into our names; -1 is null."""
-        count = len(columns["tick"])
-        if self._of_block is not None:
-            name = self._of_block(block)
-            code = -1 if name is None else self._lookup((name,))[0]
-            return constant(code, count, "int32")
-        text = columns.get(self._column)
-        if text is None:
-            return constant(-1, count, "int32")
-        if not isinstance(text, Text):
-            raise TypeError(f"column {self._column!r} must be Text")
-        return self._lookup(text.names).take(text.codes, mode="wrap")  # -1 takes the last entry
-
-    def _lookup(self, names: tuple[str, ...]) -> AnyArray:
-        known = self._lookups.get(id(names))
-        if known is not None and known[0] is names:
-            return known[1]
-        codes = [self._code.setdefault(name, len(self._code)) for name in names]
-        lookup = np.array([*codes, -1], dtype=np.int32)
-        if len(self._lookups) > 1000:  # tuples made anew for every message
-            self._lookups.clear()
-        self._lookups[id(names)] = names, lookup
-        if len(self._code) > len(self.names):
-            self.names = tuple(self._code)
-        return lookup
+    return RunTicks(runs_of_single(len(tick)) if run is None else run, tick)
 
 
 def _values(values: Any, kind: str, count: int) -> AnyArray:
     if values is None:
-        return nothing_in(count) if kind == "float64" else constant(0, count, kind)
+        return null_column(count) if kind == "float64" else constant(0, count, kind)
     values = np.asarray(values)
     # Whole numbers may be narrower: sinks widen them where they must be wide.
     if values.dtype == kind or (kind == "int64" and values.dtype.kind == "i"):
         return values
-    return constant(values[0], count, kind) if of_one_value(values) else values.astype(kind)
+    return constant(values[0], count, kind) if is_constant(values) else values.astype(kind)

@@ -14,8 +14,8 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.entry_points import registered
-from dsa_des.block.foreign import installed
+from dsa_des.block.entry_points import entry_points_of
+from dsa_des.block.foreign import load_installed
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import RUN_JSON, with_files
@@ -24,7 +24,7 @@ from dsa_des.record.drawing import pictures_in
 from dsa_des.record.notes import OF_ROWS
 from dsa_des.terminal.terminal import html_of, text_of
 from dsa_des.text.plain_json import json_text
-from dsa_des.text.safe_text import printable, shortened
+from dsa_des.text.safe_text import printable, shorten
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -100,11 +100,11 @@ class Run:
     def __repr__(self) -> str:
         title, seconds = self.info.get("title", ""), self.info.get("duration_s", "?")
         seed = self.info.get("seed", "?")
-        where = "in memory" if self.path is None else f"in {shortened(str(self.path))}"
+        where = "in memory" if self.path is None else f"in {shorten(str(self.path))}"
         rows = ", ".join(f"{name} ({len(table)} rows)" for name, table in self.tables.items())
         tables = wrap(printable(rows), _WIDTH) or ["none"]
         lines = [
-            f"Run of {shortened(repr(title))}, {seconds} s, seed {seed}, {where}",
+            f"Run of {shorten(repr(title))}, {seconds} s, seed {seed}, {where}",
             *(f"  {line}" for line in tables[:_MOST_LINES]),
         ]
         return "\n".join([*lines, *(["  ..."] if len(tables) > _MOST_LINES else [])])
@@ -120,8 +120,8 @@ class Run:
         from rich.text import Text
 
         console.print(Text(repr(self)))
-        for point in registered(REPORTS).values():
-            installed(point)().show(console, self.summary)
+        for point in entry_points_of(REPORTS).values():
+            load_installed(point)().show(console, self.summary)
 
     @property
     def summary(self) -> dict[str, Any]:

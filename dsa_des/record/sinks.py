@@ -10,8 +10,8 @@ from dsa_des.arrays.column_values import (
     Instants,
     Schema,
     Text,
+    has_same_bits,
     in_seconds,
-    same_bits,
 )
 from dsa_des.arrays.types import AnyArray
 
@@ -72,21 +72,21 @@ class _Keeping:
     def write(self, table: str, columns: Columns) -> None:
         """Keep rows of one table."""
         if len(next(iter(columns.values()), ())) >= _WORTH_PACKING:
-            columns = {name: self._packed(name, values) for name, values in columns.items()}
+            columns = {name: self._pack(name, values) for name, values in columns.items()}
         self._parts[table].append(columns)
 
-    def _packed(self, name: str, values: Any) -> Any:
+    def _pack(self, name: str, values: Any) -> Any:
         if isinstance(values, Text):
             return Text(_narrow(values.codes), values.names)
         if isinstance(values, Instants):  # most often those of the rows
-            return Instants(self._packed("tick", values.ticks), values.ticks_per_s)
+            return Instants(self._pack("tick", values.ticks), values.ticks_per_s)
         if values.dtype.kind == "i":
             values = _narrow(values)
         if not values.strides[0]:
             return values
         for parts in self._parts.values():
             other: Any = parts[-1].get(name) if parts else None
-            if other is not None and same_bits(other, values):
+            if other is not None and has_same_bits(other, values):
                 return other
         return values
 
@@ -110,9 +110,9 @@ class ColumnSink(_Keeping):
 
     def tables(self) -> dict[str, Columns]:
         """Return table name → column name → values."""
-        return {table: self._joined(table, parts) for table, parts in self._parts.items()}
+        return {table: self._concatenate(table, parts) for table, parts in self._parts.items()}
 
-    def _joined(self, table: str, parts: list[Columns]) -> Columns:
+    def _concatenate(self, table: str, parts: list[Columns]) -> Columns:
         joined: Columns = {}
         for name, kind in self._schemas[table].items():
             pieces: list[Any] = [in_seconds(part[name]) for part in parts]

@@ -21,7 +21,7 @@ SECONDS_OUT = "seconds out"
 _LEAST_SHARE = 0.1
 
 
-def added(parts: Iterable[Undone]) -> dict[str, dict[str, tuple[int, int]]]:
+def add_counts(parts: Iterable[Undone]) -> dict[str, dict[str, tuple[int, int]]]:
     """Return the counts of several runs as those of all of them, sorted."""
     result: dict[str, dict[str, tuple[int, int]]] = {}
     for part in parts:
@@ -50,7 +50,9 @@ def with_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
     return result
 
 
-def by_run(undone: Mapping[str, IntArray | tuple[int, int]], runs: int) -> dict[str, IntArray]:
+def counts_by_run(
+    undone: Mapping[str, IntArray | tuple[int, int]], runs: int
+) -> dict[str, IntArray]:
     """Return what a block says (`Component.undone`) as counts of all runs."""
     result: dict[str, IntArray] = {}
     for what, counts in undone.items():
@@ -60,7 +62,7 @@ def by_run(undone: Mapping[str, IntArray | tuple[int, int]], runs: int) -> dict[
     return result
 
 
-def of_runs(undone: UndoneByRun, runs: Collection[int] | slice) -> Undone:
+def sum_runs(undone: UndoneByRun, runs: Collection[int] | slice) -> Undone:
     """Return the counts of some runs together."""
     some = runs if isinstance(runs, slice) else list(runs)
     result: dict[str, dict[str, tuple[int, int]]] = {}
@@ -69,7 +71,7 @@ def of_runs(undone: UndoneByRun, runs: Collection[int] | slice) -> Undone:
             times, of = of_each[:, some].sum(axis=1).tolist()
             if of:
                 result.setdefault(block, {})[what] = times, of
-    return added([result])
+    return add_counts([result])
 
 
 def undone_sentences(undone: Undone) -> list[str]:
@@ -89,7 +91,7 @@ class Tries:
     had: Any = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     did: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
-    def with_more(self, run: IntArray, had: Any, did: BoolArray) -> "Tries":
+    def add_tries(self, run: IntArray, had: Any, did: BoolArray) -> "Tries":
         """Return them with masks of what some runs had, and whether it was done with them.
 
         The cases of each run stand together.

@@ -16,7 +16,7 @@ from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.block_table import Block, BlockOptions
 from dsa_des.scene.changes import Stretch, ticks_of_all
 from dsa_des.scene.checks import check_times, read_clocks
-from dsa_des.scene.keys import no_item, place_of, unquoted
+from dsa_des.scene.keys import explain_no_item, place_of, unquote_key
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
@@ -45,9 +45,9 @@ def scene_of(scene: Scene, replica: Replica) -> Scene:
         return replace(scene, seed=replica.seed)
     paths = {key: key_path(key) for key in replica.changes}
     try:
-        blocks, sections, duration = _all_changed(scene, replica.changes, paths)
+        blocks, sections, duration = _change_all(scene, replica.changes, paths)
     except (ValidationError, ValueError, LookupError, TypeError):
-        blocks, sections, duration = _each_changed(scene, replica.changes, paths)
+        blocks, sections, duration = _change_one_by_one(scene, replica.changes, paths)
     wires = scene.wires
     if any(blocks[name].options is not block.options for name, block in scene.blocks.items()):
         wires = with_latencies(wires, {name: block.options for name, block in blocks.items()})
@@ -88,7 +88,7 @@ def _stretch_of(stretch: Stretch, replica: Replica) -> Stretch:
 _Changed = tuple[dict[str, Block], dict[str, Any], Fraction | None]
 
 
-def _all_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]) -> _Changed:
+def _change_all(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]) -> _Changed:
     """Return blocks, sections and duration with all changes made at once, each table checked once.
 
     Raises whatever is wrong with any change.
@@ -100,7 +100,7 @@ def _all_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, A
         if path[0] == "blocks" and len(path) > 2 and path[1] in blocks:
             of_block.setdefault(path[1], {})[path[2:]] = value
         elif path[0] in sections and len(path) > 1:
-            sections[path[0]] = _changed(sections[path[0]], path[1:], value)
+            sections[path[0]] = _replace_value(sections[path[0]], path[1:], value)
         elif path == ("duration_s",):
             duration = parse_rational(value)
         else:
@@ -109,9 +109,9 @@ def _all_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, A
         block = blocks[name]
         of_engine = BlockOptions.model_fields.keys() - block.cls.Parameters.model_fields.keys()
         for path in [path for path in mine if path[0] in of_engine]:
-            block = replace(block, options=_changed(block.options, path, mine.pop(path)))
+            block = replace(block, options=_replace_value(block.options, path, mine.pop(path)))
         if mine:
-            block = replace(block, parameters=_changed_together(block.parameters, mine))
+            block = replace(block, parameters=_replace_values(block.parameters, mine))
         blocks[name] = block
     return blocks, sections, duration
 
@@ -123,7 +123,9 @@ _THE_SAME = {
 }
 
 
-def _each_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]) -> _Changed:
+def _change_one_by_one(
+    scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]
+) -> _Changed:
     """Make one change after the other; `SceneError` says what is wrong with each."""
     problems: list[Problem] = []
     blocks, sections, duration = dict(scene.blocks), dict(scene.sections), scene.duration_s
@@ -132,9 +134,9 @@ def _each_changed(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, 
         try:
             if path[0] == "blocks" and len(path) > 2 and path[1] in blocks:
                 name = str(path[1])
-                blocks[name] = _changed_block(blocks[name], path[2:], value)
+                blocks[name] = _change_block(blocks[name], path[2:], value)
             elif path[0] in sections and len(path) > 1:
-                sections[str(path[0])] = _changed(sections[str(path[0])], path[1:], value)
+                sections[str(path[0])] = _replace_value(sections[str(path[0])], path[1:], value)
             elif path == ("duration_s",):
                 duration = parse_rational(value)
             else:
@@ -170,7 +172,7 @@ def _times_differ(scene: Scene, blocks: Mapping[str, Block]) -> bool:
 @lru_cache(maxsize=4096)
 def key_path(key: str) -> tuple[str | int, ...]:
     """Return ``("blocks", "traffic", "intruders", 0)`` for ``blocks.traffic.intruders[0]``."""
-    parts = unquoted(key).replace("[", ".").replace("]", "").split(".")
+    parts = unquote_key(key).replace("[", ".").replace("]", "").split(".")
     return tuple(
         int(part)
         if part.isascii() and part.isdecimal() and len(part) < 10 and str(int(part)) == part
@@ -185,14 +187,14 @@ def _problem(scene: Scene, key: str, message: str, value: Any) -> Problem:
     )
 
 
-def _changed_block(block: Block, path: tuple[str | int, ...], value: Any) -> Block:
+def _change_block(block: Block, path: tuple[str | int, ...], value: Any) -> Block:
     name = path[0]
     if name in BlockOptions.model_fields and name not in block.cls.Parameters.model_fields:
-        return replace(block, options=_changed(block.options, path, value))
-    return replace(block, parameters=_changed(block.parameters, path, value))
+        return replace(block, options=_replace_value(block.options, path, value))
+    return replace(block, parameters=_replace_value(block.parameters, path, value))
 
 
-def _changed(old: Any, path: tuple[str | int, ...], value: Any) -> Any:
+def _replace_value(old: Any, path: tuple[str | int, ...], value: Any) -> Any:
     """Return `old` with the value at `path` replaced; every model on the way is validated again."""
     if not path:
         return value
@@ -203,25 +205,25 @@ def _changed(old: Any, path: tuple[str | int, ...], value: Any) -> Any:
             hint = did_you_mean(str(first), model.model_fields)
             raise ValueError(f"there is no parameter {first!r}{hint}")
         given = {name: getattr(old, name) for name in old.model_fields_set}
-        given[str(first)] = _changed(getattr(old, str(first)), rest, value)
+        given[str(first)] = _replace_value(getattr(old, str(first)), rest, value)
         return model.model_validate(given)
     if isinstance(old, list | tuple):
         items = list(old)
         index, rest = item_of(items, path)
-        items[index] = _changed(items[index], rest, value)
+        items[index] = _replace_value(items[index], rest, value)
         return items
     if isinstance(old, dict):
-        return {**old, first: _changed(old.get(first), rest, value)}
+        return {**old, first: _replace_value(old.get(first), rest, value)}
     raise ValueError(f"{first!r}: there is no table around it")
 
 
-def _changed_together(old: Any, changes: Mapping[tuple[str | int, ...], Any]) -> Any:
+def _replace_values(old: Any, changes: Mapping[tuple[str | int, ...], Any]) -> Any:
     """Return `old` with the values at many paths replaced; every model is validated once."""
     if () in changes and len(changes) > 1:
         raise ValueError  # a table and something in it: one after the other
     if len(changes) == 1:
         ((path, value),) = changes.items()
-        return _changed(old, path, value)
+        return _replace_value(old, path, value)
     parts: dict[Any, dict[tuple[str | int, ...], Any]] = {}
     for path, value in changes.items():
         first, rest = path[0], path[1:]
@@ -234,15 +236,15 @@ def _changed_together(old: Any, changes: Mapping[tuple[str | int, ...], Any]) ->
             raise LookupError
         given = {name: getattr(old, name) for name in old.model_fields_set}
         for name, mine in parts.items():
-            given[str(name)] = _changed_together(getattr(old, str(name)), mine)
+            given[str(name)] = _replace_values(getattr(old, str(name)), mine)
         return model.model_validate(given)
     if isinstance(old, list | tuple):
         items = list(old)
         for index, mine in parts.items():
-            items[index] = _changed_together(items[index], mine)
+            items[index] = _replace_values(items[index], mine)
         return items
     if isinstance(old, dict):
-        return {**old, **{n: _changed_together(old.get(n), mine) for n, mine in parts.items()}}
+        return {**old, **{n: _replace_values(old.get(n), mine) for n, mine in parts.items()}}
     raise ValueError
 
 
@@ -255,4 +257,4 @@ def item_of(items: list[Any], path: tuple[str | int, ...]) -> tuple[int, tuple[s
         index = place_of(items, ".".join(map(str, path[:length])))
         if index is not None:
             return index, path[length:]
-    raise ValueError(no_item(items, str(path[0])))
+    raise ValueError(explain_no_item(items, str(path[0])))

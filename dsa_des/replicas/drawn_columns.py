@@ -91,10 +91,10 @@ class ReplicaScenes(Sequence[Scene]):
 
     def _parameters_of(self, block: str, number: int) -> Any:
         changes = {c.path: c.values[number] for c in self._drawn if c.block == block}
-        return _with(self._scene.blocks[block].parameters, changes)
+        return _replace_values(self._scene.blocks[block].parameters, changes)
 
 
-def _with(old: Any, changes: Mapping[Path, Any]) -> Any:
+def _replace_values(old: Any, changes: Mapping[Path, Any]) -> Any:
     """Return a table with values in it that are known to be allowed."""
     parts: dict[Any, dict[Path, Any]] = {}
     for path, value in changes.items():
@@ -102,11 +102,11 @@ def _with(old: Any, changes: Mapping[Path, Any]) -> Any:
     if not isinstance(old, BaseModel):
         items = list(old)
         for index, mine in parts.items():
-            items[index] = mine[()] if () in mine else _with(items[index], mine)
+            items[index] = mine[()] if () in mine else _replace_values(items[index], mine)
         return type(old)(items)
     fields = {name: old.__dict__[name] for name in _fields_of(type(old))}
     for name, mine in parts.items():
-        fields[name] = mine[()] if () in mine else _with(fields[name], mine)
+        fields[name] = mine[()] if () in mine else _replace_values(fields[name], mine)
     return _model_of(type(old), fields, set(old.model_fields_set))
 
 
@@ -139,7 +139,7 @@ def drawn_columns(scene: Scene, replicas: Sequence[Replica]) -> ReplicaScenes | 
         seeds = [replica.seed for replica in replicas]
         probes = [{key: pick(c.values) for key, c in columns.items()} for pick in _PROBES]
         made = [scene_of(scene, Replica(seeds[0], probe)) for probe in probes]
-        return ReplicaScenes(made[0], seeds, _watched(made[0], list(columns.values())))
+        return ReplicaScenes(made[0], seeds, _watch_columns(made[0], list(columns.values())))
     except (_NoColumn, SceneError):
         return None
 
@@ -175,7 +175,7 @@ def _column(scene: Scene, key: str, values: Sequence[Any]) -> DrawnColumn:
     if path[2] in BlockOptions.model_fields and path[2] not in type(block.parameters).model_fields:
         raise _NoColumn
     found, model, name = _place(block.parameters, path[2:])
-    return DrawnColumn(block.name, found, _as_held(model, name, values))
+    return DrawnColumn(block.name, found, _validated_values(model, name, values))
 
 
 def _place(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
@@ -185,7 +185,7 @@ def _place(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
     while path:
         if isinstance(old, BaseModel):
             model, name = type(old), str(path[0])
-            if name not in model.model_fields or not _allows_columns(model):
+            if name not in model.model_fields or not _can_check_columns(model):
                 raise _NoColumn
             old, path = getattr(old, name), path[1:]
             found.append(name)
@@ -203,12 +203,12 @@ def _place(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
     raise _NoColumn
 
 
-def _allows_columns(model: type[BaseModel]) -> bool:
+def _can_check_columns(model: type[BaseModel]) -> bool:
     """Whether a model's values are checked by their own fields and by validators of the whole."""
     known = model.__pydantic_decorators__
     alien = (
         model.__init__ is not BaseModel.__init__
-        or "model_validate" in _written(model)
+        or "model_validate" in _declared_names(model)
         or model.__private_attributes__
         or model.model_config.get("extra") == "allow"
         or known.root_validators
@@ -228,7 +228,7 @@ def _allows_columns(model: type[BaseModel]) -> bool:
     )
 
 
-def _written(cls: type, known: type = BaseModel) -> set[str]:
+def _declared_names(cls: type, known: type = BaseModel) -> set[str]:
     """Return what a class and its bases say themselves, up to one that is known."""
     bases = cls.__mro__[: cls.__mro__.index(known)] if known in cls.__mro__ else cls.__mro__
     return {name for base in bases for name in vars(base)}
@@ -239,7 +239,7 @@ def _is_of_all(function: Any) -> bool:
     return getattr(function, "__func__", None) is Parameters._computable.__func__  # type: ignore[attr-defined]
 
 
-def _as_held(model: type[BaseModel], name: str, values: Sequence[Any]) -> list[Any]:
+def _validated_values(model: type[BaseModel], name: str, values: Sequence[Any]) -> list[Any]:
     """Return values of a field that has bounds and nothing else, as it holds them."""
     field = model.model_fields[name]
     union = get_origin(field.annotation) in (Union, UnionType)
@@ -269,7 +269,7 @@ def _as_held(model: type[BaseModel], name: str, values: Sequence[Any]) -> list[A
     return held
 
 
-def _watched(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[DrawnColumn]:
+def _watch_columns(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[DrawnColumn]:
     """Return the columns if no validator reads what is drawn, and clocks read offsets only.
 
     Ticks of a second and times that they can hold are then those of the replicas that were checked.
@@ -279,7 +279,7 @@ def _watched(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[DrawnColu
         block = scene.blocks[name]
         try:
             with _reading() as read:
-                parameters = _validated(block.parameters, [column.path for column in mine])
+                parameters = _validate_watched(block.parameters, [column.path for column in mine])
                 if read:
                     raise _NoColumn
                 block.cls.clock_of(parameters)
@@ -288,8 +288,8 @@ def _watched(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[DrawnColu
             raise _NoColumn from error
         for column in mine if own_clock else ():
             if (
-                "clock_of" in _written(block.cls, Component)
-                or "clock_spec" in _written(type(block.parameters), ClockedParameters)
+                "clock_of" in _declared_names(block.cls, Component)
+                or "clock_spec" in _declared_names(type(block.parameters), ClockedParameters)
                 or column.path == ("scan_rate_hz",)
                 or any(NANOSECONDS % value.denominator for value in _offsets(column))
             ):
@@ -301,7 +301,7 @@ def _offsets(column: DrawnColumn) -> Sequence[Fraction]:
     return column.values if column.path == ("offset_s",) else ()
 
 
-def _validated(old: Any, paths: Sequence[Path]) -> Any:
+def _validate_watched(old: Any, paths: Sequence[Path]) -> Any:
     """Validate a table again, with tables in it that note what is read of the values at paths."""
     parts: dict[Any, list[Path]] = {}
     for path in paths:
@@ -309,12 +309,12 @@ def _validated(old: Any, paths: Sequence[Path]) -> Any:
     if not isinstance(old, BaseModel):
         items = list(old)
         for index, mine in parts.items():
-            items[index] = _validated(items[index], mine)
+            items[index] = _validate_watched(items[index], mine)
         return items
     given = {name: getattr(old, name) for name in old.model_fields_set | parts.keys()}
     for name, mine in parts.items():
         if mine != [()]:
-            given[name] = _validated(given[name], mine)
+            given[name] = _validate_watched(given[name], mine)
     drawn = frozenset(name for name, mine in parts.items() if mine == [()])
     return _watched_type(type(old), drawn).model_validate(given)
 

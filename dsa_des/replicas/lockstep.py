@@ -14,9 +14,9 @@ import numpy as np
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import ClockedParameters, Component, Context
-from dsa_des.block.foreign_calls import must_pass
+from dsa_des.block.foreign_calls import is_stop_request
 from dsa_des.record.recording import Recorder
-from dsa_des.record.undone import UndoneByRun, by_run
+from dsa_des.record.undone import UndoneByRun, counts_by_run
 from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.running.effects import build_effects
@@ -86,21 +86,21 @@ class Replicas(Timeline):
         super().set_length(components, duration_s)
         self._faces = components
         for name, component in components.items():
-            if self._shared(name, component):
+            if self._is_shared(name, component):
                 self.streams.share(name)
             else:
                 if component.process is not None:
                     raise NotInLockStep(f"block {name} has a process of its own")
                 make = self._maker(name, component)
-                if (runner := self._together(name, component)) is not None:
+                if (runner := self._combined_component(name, component)) is not None:
                     self.together[name] = runner
                     continue
-                self.split[name] = SplitBlock(tuple(component.outputs), make, self._finished)
+                self.split[name] = SplitBlock(tuple(component.outputs), make, self._finish)
 
-    def _shared(self, name: str, component: Component) -> bool:
+    def _is_shared(self, name: str, component: Component) -> bool:
         """Whether one instance serves all replicas."""
         # What was drawn when it was set up would be the first one's in all of them.
-        if not component.serves_replicas() or self.streams.drew_for_all(name):
+        if not component.serves_replicas() or self.streams.has_drawn_for_all(name):
             return False
         differing = self._differing(name)
         if isinstance(component.p, ClockedParameters):
@@ -121,18 +121,18 @@ class Replicas(Timeline):
                 )
         return names
 
-    def _together(self, name: str, face: Component) -> Component | None:
+    def _combined_component(self, name: str, face: Component) -> Component | None:
         """Return what runs a block for all replicas though they differ, if it offers that."""
 
         def make(number: int) -> Component:
-            component = self._made(name, number)
+            component = self._make_component(name, number)
             self._check_same_length(face, component)
             return component
 
         try:
             return face.together(self._parameters_of(name), make)
         except BaseException as error:
-            if must_pass(error):
+            if is_stop_request(error):
                 raise
             return None  # what is wrong with one of them shows when that one is made
 
@@ -144,7 +144,7 @@ class Replicas(Timeline):
             return self._scenes.parameters_of(name)
         return [scene.blocks[name].parameters for scene in self._scenes]
 
-    def _made(self, name: str, number: int) -> Component:
+    def _make_component(self, name: str, number: int) -> Component:
         """Return a block as a replica has it, not set up."""
         scene, face = self._scenes[number], self._faces[name].context
         context = Context(
@@ -158,7 +158,7 @@ class Replicas(Timeline):
 
     def _maker(self, name: str, face: Component) -> Callable[[int], Component]:
         def make(number: int) -> Component:
-            scene, component = self._scenes[number], self._made(name, number)
+            scene, component = self._scenes[number], self._make_component(name, number)
             self._check_same_length(face, component)
             build_effects(component, scene.tolerance)
             component.setup()
@@ -202,9 +202,9 @@ class Replicas(Timeline):
         shared = {n: c for n, c in components.items() if n not in self.split}
         return {**super().undone(shared), **self._undone}
 
-    def _finished(self, number: int, component: Component) -> None:
+    def _finish(self, number: int, component: Component) -> None:
         of_all = self._undone.setdefault(component.name, {})
-        for what, counts in by_run(component.undone(), 1).items():
+        for what, counts in counts_by_run(component.undone(), 1).items():
             of_all.setdefault(what, np.zeros((2, self.count), dtype=np.int64))
             of_all[what][:, [number]] += counts
         if self._report is not None:
@@ -216,7 +216,7 @@ class Replicas(Timeline):
     def stretched(self, instances: Sequence[Component]) -> StretchedBlock | None:
         """Return the instances of a block that changes, each of which serves all replicas."""
         stretched, name = super().stretched(instances), instances[0].name
-        if stretched is not None and not all(self._shared(name, one) for one in instances):
+        if stretched is not None and not all(self._is_shared(name, one) for one in instances):
             raise NotInLockStep(f"block {name} changes while it runs, and cannot be shared")
         return stretched
 
@@ -271,7 +271,7 @@ class Replicas(Timeline):
             for name in self.together:
                 make = self._maker(name, components[name])
                 for number in range(len(self._scenes)):
-                    self._finished(number, make(number))
+                    self._finish(number, make(number))
         return {}
 
 
@@ -315,7 +315,7 @@ def _change_alike(scene: Scene, first: Scene) -> bool:
         one.wires == other.wires
         and one.sections == other.sections
         and all(
-            _but_clock(one.blocks[name]) == _but_clock(block)
+            _parameters_without_clock(one.blocks[name]) == _parameters_without_clock(block)
             for name, block in other.blocks.items()
             if block.parameters != first.blocks[name].parameters
         )
@@ -323,7 +323,7 @@ def _change_alike(scene: Scene, first: Scene) -> bool:
     )
 
 
-def _but_clock(block: Block) -> dict[str, Any]:
+def _parameters_without_clock(block: Block) -> dict[str, Any]:
     """Return a block's parameters without what only the engine reads of its clock."""
     clocked = isinstance(block.parameters, ClockedParameters)
     values = dict(block.parameters)

@@ -11,7 +11,7 @@ from dsa_des.block.message import Columns, rows_of
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
-from dsa_des.record.undone import Undone, UndoneByRun, added, of_runs
+from dsa_des.record.undone import Undone, UndoneByRun, add_counts, sum_runs
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.drawn_columns import drawn_columns, scenes_of
 from dsa_des.replicas.lockstep import NotInLockStep, Replicas, lock_step
@@ -77,17 +77,17 @@ def run_replicas(
     these are some of them. What is returned is in the order of `replicas`, and each is identical to
     a run of its own.
     """
-    failed, scenes = _checked(scene, replicas)
+    failed, scenes = _check_replicas(scene, replicas)
     ran: list[Recorded | Failed] = []
     runs = len(replicas) if runs is None else runs
-    for part in _at_once(scenes):
-        together: Sequence[Recorded | Failed] | None = _together(part, wanted, runs)
-        ran += together or [_run(one, wanted, runs) for one in part]
+    for part in _split_by_memory(scenes):
+        together: Sequence[Recorded | Failed] | None = _run_together(part, wanted, runs)
+        ran += together or [_run_alone(one, wanted, runs) for one in part]
     outcomes = iter(ran)
     return [next(outcomes) if one is None else one for one in failed]
 
 
-def _checked(
+def _check_replicas(
     scene: Scene, replicas: Sequence[Replica]
 ) -> tuple[list[Recorded | Failed | None], Sequence[Scene]]:
     """Return which replicas failed already, None for the others, and the scenes of those."""
@@ -105,16 +105,16 @@ def _checked(
     return failed, scenes
 
 
-def _at_once(scenes: Sequence[Scene]) -> Iterator[Sequence[Scene]]:
+def _split_by_memory(scenes: Sequence[Scene]) -> Iterator[Sequence[Scene]]:
     """Part replicas into as many as may run together."""
     if not scenes:
         return
-    most = most_together(scenes[0])
+    most = largest_lock_step(scenes[0])
     for start in range(0, len(scenes), most):
         yield scenes[start : start + most]
 
 
-def most_together(scene: Scene) -> int:
+def largest_lock_step(scene: Scene) -> int:
     """Return how many replicas of a scene may run together: all that they hold is in memory."""
     return max(1, int(_MOST_BYTES / _likely_bytes(scene)))
 
@@ -127,7 +127,7 @@ def _likely_bytes(scene: Scene) -> float:
     return _BYTES + (_BYTES_PER_S + _BYTES_PER_SCAN * per_s) * duration_s
 
 
-def why_apart(scene: Scene, replicas: Sequence[Replica]) -> str | None:
+def lock_step_refusal(scene: Scene, replicas: Sequence[Replica]) -> str | None:
     """Return why replicas cannot run in lock step, as far as it shows before they run."""
     try:
         together = Replicas(scenes_of(scene, replicas))
@@ -140,7 +140,7 @@ def why_apart(scene: Scene, replicas: Sequence[Replica]) -> str | None:
     return None
 
 
-def _together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Recorded] | None:
+def _run_together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Recorded] | None:
     """Run scenes in lock step; None where they cannot, or where one of them fails."""
     if len(scenes) < 2:
         return None
@@ -188,7 +188,7 @@ def _report(scenes: Sequence[Scene], number: int) -> dict[str, Any]:
     return Simulation(scenes[number]).run().report
 
 
-def _run(scene: Scene, wanted: Wanted, runs: int) -> Recorded | Failed:
+def _run_alone(scene: Scene, wanted: Wanted, runs: int) -> Recorded | Failed:
     try:
         sink = ColumnSink()
         simulation = Simulation(scene, recorder=Recorder([sink], wanted=wanted, runs=runs))
@@ -210,4 +210,6 @@ def undone_in(outcomes: Iterable[Recorded | Failed]) -> Undone:
             parts.append(one.undone)
             if (shared := one.shared) is not None:
                 together.setdefault(id(shared), (shared, []))[1].append(one.number)
-    return added([*parts, *(of_runs(shared.undone, runs) for shared, runs in together.values())])
+    return add_counts(
+        [*parts, *(sum_runs(shared.undone, runs) for shared, runs in together.values())]
+    )

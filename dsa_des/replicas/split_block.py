@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks, no_runs
+from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import STATIC, Message
@@ -59,12 +59,15 @@ class SplitBlock:
                 self._made.add(number)
             part = _part(wake, slice(first, end), number)
             for port, waiting in self._waiting.pop(number, {}).items():
-                part._arrived = {**part._arrived, port: _after(waiting, part.arrivals(port))}
+                part._arrived = {
+                    **part._arrived,
+                    port: _append_arrivals(waiting, part.arrivals(port)),
+                }
             result = self._instances[number].run(part)
             for port, message in by_output(result, self._outputs).items():
                 run = np.full(len(message), number, dtype=np.int64)
                 sent.setdefault(port, []).append(message.of_runs(run))
-        return {port: _joined(parts) for port, parts in sent.items()} or None
+        return {port: _concatenate(parts) for port, parts in sent.items()} or None
 
     def _keep_waiting(self, wake: Wake) -> None:
         """Keep what comes for instances that do not run in this wake, as a wire would."""
@@ -74,7 +77,7 @@ class SplitBlock:
                 for number in np.unique(of[~np.isin(of, wake.run)]).tolist():
                     part = _arrivals(new, number)
                     held = self._waiting.setdefault(number, {}).setdefault(port, [])
-                    held[:] = _after(held, [part] if part else [])
+                    held[:] = _append_arrivals(held, [part] if part else [])
 
     def close(self, replicas: int) -> None:
         """Let the last instances go; those of replicas that never ran have their say as well.
@@ -100,7 +103,7 @@ def _part(wake: Wake, rows: slice, number: int) -> Wake:
         if len(there) == 0:
             continue  # nothing has arrived in this replica yet
         low = int(there.min())
-        part = _alone(message.take(slice(low, int(there.max()) + 1)))
+        part = _message_of_one_run(message.take(slice(low, int(there.max()) + 1)))
         held[port] = part, np.where(mine < 0, -1, mine - low)
     arrived = {
         port: [came for new in arrivals if (came := _arrivals(new, number))]
@@ -108,7 +111,7 @@ def _part(wake: Wake, rows: slice, number: int) -> Wake:
     }
 
     def demand() -> dict[str, IntArray]:
-        return {block: _within(asked, rows) for block, asked in wake.demand.items()}
+        return {block: _rows_within(asked, rows) for block, asked in wake.demand.items()}
 
     instants, scans = RunTicks.of_run(0, wake.ticks[rows]), wake.scans[rows]
 
@@ -124,32 +127,32 @@ def _arrivals(new: Arrivals, number: int) -> Arrivals | None:
     if first == end:
         return None
     instants = RunTicks.of_run(0, new.tick[first:end])
-    return Arrivals(new.source, instants, _alone(new.message.take(slice(first, end))))
+    return Arrivals(new.source, instants, _message_of_one_run(new.message.take(slice(first, end))))
 
 
-def _alone(message: Message) -> Message:
+def _message_of_one_run(message: Message) -> Message:
     """Return a message of one run as that of a run by itself."""
-    return message.of_runs(no_runs(len(message)))
+    return message.of_runs(runs_of_single(len(message)))
 
 
-def _after(one: list[Arrivals], other: list[Arrivals]) -> list[Arrivals]:
+def _append_arrivals(one: list[Arrivals], other: list[Arrivals]) -> list[Arrivals]:
     """Return what came over each wire, first `one` and then the `other`, by source."""
     by_source = {new.source: new for new in one}
     for new in other:
         old = by_source.get(new.source)
         if old is not None:
             message = type(new.message).concatenate([old.message, new.message])
-            new = Arrivals(new.source, RunTicks.joined([old.instants, new.instants]), message)
+            new = Arrivals(new.source, RunTicks.concatenate([old.instants, new.instants]), message)
         by_source[new.source] = new
     return [by_source[name] for name in sorted(by_source)]
 
 
-def _within(asked: IntArray, rows: slice) -> IntArray:
+def _rows_within(asked: IntArray, rows: slice) -> IntArray:
     first, end = np.searchsorted(asked, [rows.start, rows.stop]).tolist()
     return asked[first:end] - rows.start
 
 
-def _joined(parts: list[Message]) -> Message:
+def _concatenate(parts: list[Message]) -> Message:
     """Join messages of one port; what is the same for all rows must be the same for all parts."""
     first = parts[0]
     for item in fields(first):
@@ -158,14 +161,14 @@ def _joined(parts: list[Message]) -> Message:
         value = getattr(first, item.name)
         for part in parts[1:]:
             other = getattr(part, item.name)
-            if other is not value and not _same(other, value):
+            if other is not value and not _is_same(other, value):
                 raise NotInLockStep(f"{type(first).__name__}.{item.name} differs between replicas")
     return type(first).concatenate(parts)
 
 
-def _same(one: Any, other: Any) -> bool:
+def _is_same(one: Any, other: Any) -> bool:
     if isinstance(one, np.ndarray):
         return np.array_equal(one, other)
     if isinstance(one, Mapping):
-        return one.keys() == other.keys() and all(_same(one[k], other[k]) for k in one)
+        return one.keys() == other.keys() and all(_is_same(one[k], other[k]) for k in one)
     return bool(one == other)

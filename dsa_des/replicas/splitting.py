@@ -126,7 +126,7 @@ def instant_ns(reached_s: float) -> int:
     return math.ceil(reached_s * NANOSECONDS) + _SURELY_NS
 
 
-def repeated(
+def run_repetitions(
     repetitions: Sequence[Sequence[Replica]],
     seeds: Sequence[int],
     levels: Sequence[float],

@@ -13,7 +13,7 @@ from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.drawn_columns import scenes_of
 from dsa_des.scene.changes import TimedChange
 from dsa_des.scene.scene import Scene
-from dsa_des.stretches.outages import Outages, merged
+from dsa_des.stretches.outages import Outages, merge_spans
 from dsa_des.time.randomness import Streams
 from dsa_des.time.runs import Runs
 
@@ -23,10 +23,10 @@ TimesOut = Mapping[str, list[FloatArray]]
 _ENABLED = "enabled"
 
 
-def may_be_out(scene: Scene) -> list[str]:
+def blocks_that_may_be_out(scene: Scene) -> list[str]:
     """Return the blocks that fail at random or that changes switch on or off, sorted."""
     names = {name for one in scene.outages for name in one.blocks}
-    return sorted(names.union(*(map(_switched, scene.changes))))
+    return sorted(names.union(*(map(_switched_blocks, scene.changes))))
 
 
 def times_out_s(scene: Scene, seeds: Sequence[int], ends_s: FloatArray) -> TimesOut:
@@ -41,7 +41,7 @@ def times_out_s(scene: Scene, seeds: Sequence[int], ends_s: FloatArray) -> Times
     starts = [0, *(int(stretch.from_s * per_s) for stretch in scene.stretches), runs.run_ticks]
     scenes = [scene, *(stretch.scene for stretch in scene.stretches)]
     result: dict[str, list[FloatArray]] = {}
-    for name in may_be_out(scene):
+    for name in blocks_that_may_be_out(scene):
         failing = [one for one in scene.outages if name in one.blocks]
         drawn = Outages(failing, Streams(seeds), runs, per_s) if failing else None
         off = np.array(
@@ -55,7 +55,7 @@ def times_out_s(scene: Scene, seeds: Sequence[int], ends_s: FloatArray) -> Times
         result[name] = []
         for run, end in enumerate(ends.tolist()):
             parts = [off] if drawn is None else [off, drawn.spans(run)]
-            result[name].append(merged(np.concatenate(parts), end) / per_s)
+            result[name].append(merge_spans(np.concatenate(parts), end) / per_s)
     return result
 
 
@@ -68,10 +68,10 @@ def times_out(scene: Scene, replicas: Sequence[Replica], ends_s: FloatArray) -> 
         times_out_s(one, [seed], ends_s[[number]])
         for number, (one, seed) in enumerate(zip(scenes_of(scene, replicas), seeds, strict=True))
     ]
-    return {name: [one[name][0] for one in each] for name in may_be_out(scene)}
+    return {name: [one[name][0] for one in each] for name in blocks_that_may_be_out(scene)}
 
 
-def _switched(change: TimedChange) -> set[str]:
+def _switched_blocks(change: TimedChange) -> set[str]:
     """Return which blocks a change switches on or off."""
     blocks = (key for key in change.keys if key[0] == "blocks")
     return {str(key[1]) for key in blocks if key[2:] == (_ENABLED,)}

@@ -11,7 +11,7 @@ import numpy as np
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import BLUE, PALETTE
 from dsa_des.record.drawing import drawing, figure_text, tight
-from dsa_des.results.labels import axis_label, readable, signed, unit_of, value_label
+from dsa_des.results.labels import axis_label, format_with_interval, readable, unit_of, value_label
 from dsa_des.results.maps import Target
 from dsa_des.results.statistics import chi_square_bounds
 from dsa_des.results.summary import Compared, Line
@@ -77,7 +77,7 @@ def draw_axis(
             _dodge(top, drawn, number, len(series))
         top.set_ylabel(readable(metric))
         top.set_title(figure_text(title, _TITLE), loc="left")
-        _beside(top)
+        _put_legend_beside(top)
         if shown:
             _differences(grid[1], shown, where, axes, axis, confidence)
         bottom = grid[-1]
@@ -107,12 +107,12 @@ def _ticks(axes: Any, values: list[Any], where: dict[Any, float], numeric: bool)
     positive = [v for v in values if v > 0]
     if len(positive) == len(values) > 2 and max(values) / min(values) >= 8:
         axes.set_xscale("log")
-        ticks = _apart(values)
+        ticks = _drop_touching_labels(values)
         axes.set_xticks(ticks, [f"{v:g}" for v in ticks])
         axes.set_xticks([], minor=True)
 
 
-def _apart(values: list[float]) -> list[float]:
+def _drop_touching_labels(values: list[float]) -> list[float]:
     """Return those values whose labels do not touch on a log axis, the first and the last first."""
     low, high = math.log(min(values)), math.log(max(values))
     kept: list[float] = []
@@ -123,7 +123,7 @@ def _apart(values: list[float]) -> list[float]:
     return sorted(kept)
 
 
-def _beside(axes: Any) -> None:
+def _put_legend_beside(axes: Any) -> None:
     """Put the legend beside the axes, where it covers nothing, in lines that leave them room."""
     handles, names = axes.get_legend_handles_labels()
     if names:
@@ -132,7 +132,7 @@ def _beside(axes: Any) -> None:
 
 
 def _dodge(axes: Any, drawn: Sequence[Any], number: int, of: int) -> None:
-    """Move a series to the side, so that the intervals of several stand beside each other."""
+    """Shift a series sideways, so that the intervals of several series do not overlap."""
     from matplotlib.transforms import ScaledTranslation
 
     apart_pt = min(_APART_PT, 30.0 / of)
@@ -185,7 +185,7 @@ def _differences(
             for px, item in zip(x, items, strict=True):
                 e = item.difference.paired
                 text_at = {"xytext": (7, 4), "textcoords": "offset points", "fontsize": 8}
-                axes.annotate(signed(e.value, e.half_width), (px, e.value), **text_at)
+                axes.annotate(format_with_interval(e.value, e.half_width), (px, e.value), **text_at)
     unit = unit_of(shown[0].result.name)
     axes.set_ylabel(f"Difference from\nthat at {text}{f' ({unit})' if unit else ''}")
     known = any(np.isfinite(item.difference.paired.half_width) for item in shown)
@@ -238,7 +238,7 @@ def _chart(
         axes = figure.add_subplot()
         yield axes
         axes.set_title(figure_text(title, _TITLE), loc="left")
-        _beside(axes)
+        _put_legend_beside(axes)
         tight(figure)
 
 
@@ -261,7 +261,7 @@ def draw_histogram(
             colour = _style(mark, number, len(known))[0]
             counts = np.histogram(values, edges)[0]
             axes.stairs(
-                counts, edges, color=colour, lw=1.4, label=_counted(series_label, values, runs)
+                counts, edges, color=colour, lw=1.4, label=_count_label(series_label, values, runs)
             )
             axes.stairs(counts, edges, color=colour, fill=True, alpha=0.15)
         axes.set_ylim(bottom=0.0)
@@ -290,14 +290,14 @@ def draw_cdf(
             axes.step(
                 np.concatenate((ascending[:1], ascending)), np.concatenate(([0.0], share)),
                 where="post", color=colour, lw=1.4 + 1.3 * wider,
-                label=_counted(series_label, ascending, len(values)),
+                label=_count_label(series_label, ascending, len(values)),
             )  # fmt: skip
         axes.set_ylim(0.0, 1.02)
         axes.set(xlabel=readable(metric), ylabel="Share of the runs at or below")
         axes.grid(color="#DDDDDD", linewidth=0.5)
 
 
-def _counted(series_label: str, values: FloatArray, runs: int) -> str:
+def _count_label(series_label: str, values: FloatArray, runs: int) -> str:
     of = f"{len(values):,} of {runs:,}" if len(values) < runs else f"{runs:,}"
     return f"{series_label}: {of} runs" if series_label else f"{of} runs"
 

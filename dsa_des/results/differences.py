@@ -12,16 +12,16 @@ from dsa_des.results.ratio import PairedRatio, influences, paired_ratio
 from dsa_des.results.statistics import (
     FEW,
     Estimate,
+    clip_estimate,
     mean,
     normal_error,
     normal_quantile,
     quantile,
-    scaled,
+    scale_by_power_of_two,
     standard_error,
     symmetric,
     t_quantile,
     unseen_event,
-    within,
 )
 
 _RESAMPLES = 1000
@@ -112,14 +112,16 @@ def difference(
     changes = changes_of(first[both], second[both])
     whole = kind == "share" and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
     counted = len(changes) > 1 and (kind == "event" or whole)
-    paired = _counted(changes, confidence) if counted else mean(changes, confidence, method)
+    paired = (
+        _estimate_by_counts(changes, confidence) if counted else mean(changes, confidence, method)
+    )
     apart = counted and bool(np.isin((first[both], second[both]), (0.0, 1.0)).all())
     if apart:
-        unpaired = _counted_apart(first[both], second[both], confidence)
+        unpaired = _estimate_by_shares(first[both], second[both], confidence)
     else:
         unpaired = _welch(first[both], changes, confidence)
     if kind != "number":
-        paired, unpaired = _of_shares(paired), _of_shares(unpaired)
+        paired, unpaired = _clip_to_shares(paired), _clip_to_shares(unpaired)
     return EstimatedDifference(
         paired,
         unpaired,
@@ -160,12 +162,12 @@ def quantile_difference(
     )
 
 
-def _of_shares(result: Estimate) -> Estimate:
+def _clip_to_shares(result: Estimate) -> Estimate:
     """Return a difference of shares whose interval holds nothing that none can be."""
-    return within(result, -1.0, 1.0)
+    return clip_estimate(result, -1.0, 1.0)
 
 
-def _counted(changes: FloatArray, confidence: float) -> Estimate:
+def _estimate_by_counts(changes: FloatArray, confidence: float) -> Estimate:
     """Return the mean of changes of events, as if one unit more had gained and one more had lost.
 
     Units of several runs differ by parts of an event: there the two lie the smallest part that is
@@ -183,7 +185,7 @@ def _counted(changes: FloatArray, confidence: float) -> Estimate:
     return Estimate(value, middle - half, middle + half, count, count < FEW)
 
 
-def _counted_apart(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:
+def _estimate_by_shares(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:
     """Return the difference of two shares, each as if of one unit more of either kind."""
     count = len(first)
     one, other = ((result.sum() + 1.0) / (count + 2.0) for result in (first, second))
@@ -198,7 +200,9 @@ def _welch(first: FloatArray, changes: FloatArray, confidence: float) -> Estimat
     if count < 2:
         return Estimate(math.nan, math.nan, math.nan, count, True)
     value = mean(changes, confidence).value
-    errors, exponent = scaled(np.array([standard_error(first), standard_error(first + changes)]))
+    errors, exponent = scale_by_power_of_two(
+        np.array([standard_error(first), standard_error(first + changes)])
+    )
     one, other = (errors**2).tolist()
     if one + other == 0.0:
         return Estimate(value, value, value, count, count < FEW)
@@ -220,7 +224,7 @@ class RatioTerms(NamedTuple):
     #: What each was predicted before it was flown; None where nothing is.
     predicted: FloatArray | None = None
 
-    def of(self, some: IntArray | BoolArray) -> "RatioTerms":
+    def select_runs(self, some: IntArray | BoolArray) -> "RatioTerms":
         """Return those of some runs."""
         columns: list[Any] = [None if column is None else column[some] for column in self]
         return RatioTerms(*columns)
@@ -275,7 +279,7 @@ def _unseen_variance(nominal: FloatArray) -> float:
     `nominal` are the clusters' terms below the line; one event more weighs what those do, drawn in
     proportion to their weights.
     """
-    part, _ = scaled(nominal)
+    part, _ = scale_by_power_of_two(nominal)
     return unseen_event(part)[1] / math.fsum(part) ** 2
 
 

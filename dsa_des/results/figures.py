@@ -21,7 +21,7 @@ from dsa_des.results.curves import (
 from dsa_des.results.labels import value_label
 from dsa_des.results.maps import Target, draw_heat, draw_map
 from dsa_des.results.record import FigureRecord
-from dsa_des.results.summary import Line, of_series
+from dsa_des.results.summary import Line, results_of_series
 from dsa_des.results.tables import Tables
 
 #: Letters of a figure's title.
@@ -70,7 +70,7 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
     axes, metric = tables.rows.axes, str(figure.metric)
     if any(n is not None and n not in axes for n in (figure.axis, figure.x, figure.y)):
         return False
-    title = _cut(tables.record.title if figure.title is None else figure.title)
+    title = _shorten(tables.record.title if figure.title is None else figure.title)
     confidence = tables.record.confidence
     if figure.kind in ("histogram", "cdf"):
         return _draw_spread(target, tables, figure, title)
@@ -104,7 +104,7 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
     return True
 
 
-def _cut(title: str) -> str:
+def _shorten(title: str) -> str:
     return title if len(title) <= _LONGEST_TITLE else f"{title[: _LONGEST_TITLE - 1]}…"
 
 
@@ -130,7 +130,7 @@ def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: st
 
 def _series_of(tables: Tables, metric: str) -> list[Series]:
     """Return the results that differ in a number, one series per combination of axis values."""
-    known = of_series(metric, [line.result.name for line in tables.lines])
+    known = results_of_series(metric, [line.result.name for line in tables.lines])
     by_place: dict[tuple[Any, ...], dict[str, Line]] = {}
     for line in tables.lines:
         if line.result.name in known:
@@ -150,14 +150,14 @@ def _draw_scatters(tables: Tables, axis: str, baseline: Any, only: Sequence[str]
     """Draw results of two types in one block against each other."""
     index = tables.rows.axes.index(axis)
     paths = []
-    for value, others, base, chosen in tables.rows.against(axis, baseline):
+    for value, others, base, chosen in tables.rows.comparisons_with_baseline(axis, baseline):
         at = (*others[:index], value, *others[index:])
         for metric in tables.notable_results(only):
-            _, first, second = tables.rows.paired(metric, base, chosen)
+            _, first, second = tables.rows.paired_values(metric, base, chosen)
             name = "-".join(["scatter", metric, *map(str, at)])
             drawn = _stream(f"{safe_name(name)}.png")
             names = str(baseline), str(value)
-            draw_scatter(drawn, first, second, names, metric, _cut(tables.record.title))
+            draw_scatter(drawn, first, second, names, metric, _shorten(tables.record.title))
             paths.append(_write(tables, drawn))
     return paths
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, TypeVar
 from pydantic import ValidationError
 
 from dsa_des.errors import UsageError
-from dsa_des.files.output_file import PREFIX, locked, write_file
-from dsa_des.files.output_names import why_not_written
-from dsa_des.files.sealed_files import ABOUT, is_sealed, open_lock, read_regular, sealed
-from dsa_des.record.undone import Undone, added
+from dsa_des.files.output_file import PREFIX, lock_file, write_file
+from dsa_des.files.output_names import describe_write_error
+from dsa_des.files.sealed_files import ABOUT, is_sealed, open_lock, read_regular, seal
+from dsa_des.record.undone import Undone, add_counts
 from dsa_des.results.record import StudyHead, StudyRecord
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Parts:
         """Write a part as a whole, sealed as one of the study, whoever else writes it too."""
         path = self.folder / PARTS / f"{name}.parquet"
         try:
-            write_file(path, sealed(content, f"{self.study_sha256} {name}"), to_disk=True)
+            write_file(path, seal(content, f"{self.study_sha256} {name}"), to_disk=True)
         except OSError as error:
             raise NotWritten(error.strerror or str(error)) from None
 
@@ -92,10 +92,10 @@ class StudyFolder:
             self.parts.mkdir(parents=True, exist_ok=True)
             self._take_lock()
             # Only now is all that is there ours: before, it may have been another process's.
-            self._take_up(description, resume=resume)
+            self._resume(description, resume=resume)
         except OSError as error:
             self.close()
-            why = why_not_written(error, self.path)
+            why = describe_write_error(error, self.path)
             raise UsageError(f"--out {self.path}: cannot be written: {why}") from error
         except BaseException:
             self.close()
@@ -124,10 +124,10 @@ class StudyFolder:
         except OSError as error:
             reason = f"{self.path / LOCK}: cannot be written: {error.strerror}"
             raise UsageError(reason) from None
-        if locked(self._lock) is False:
+        if lock_file(self._lock) is False:
             raise UsageError(f"{self.path}: another process is running this study")
 
-    def _take_up(self, text: str, *, resume: bool) -> None:
+    def _resume(self, text: str, *, resume: bool) -> None:
         known = os.path.lexists(self.path / STUDY_JSON)
         if known and not resume:
             raise UsageError(
@@ -161,16 +161,16 @@ class StudyFolder:
     @property
     def head(self) -> StudyHead:
         """Which study is there."""
-        return self._read(StudyHead)
+        return self._read_head(StudyHead)
 
     @property
     def record(self) -> StudyRecord:
         """What the folder says of its study."""
         if self._record is None:
-            self._record = self._read(StudyRecord)
+            self._record = self._read_head(StudyRecord)
         return self._record
 
-    def _read(self, model: type[_Head]) -> _Head:
+    def _read_head(self, model: type[_Head]) -> _Head:
         path = self.path / STUDY_JSON
         if not os.path.lexists(path):
             raise UsageError(f"{self.path}: is not the folder of a study: it has no {STUDY_JSON}")
@@ -208,12 +208,14 @@ class StudyFolder:
 
         Only some `columns` are read of a part that was checked before.
         """
-        table = self._sealed(self.parts / f"{name}.parquet", name, columns)
+        table = self._read_sealed(self.parts / f"{name}.parquet", name, columns)
         table = None if table is None else table.replace_schema_metadata(None)
         whole = table is None or columns is not None or _fits(table, self.record)
         return table if whole else None
 
-    def _sealed(self, path: Path, name: str, columns: Sequence[str] | None) -> "pa.Table | None":
+    def _read_sealed(
+        self, path: Path, name: str, columns: Sequence[str] | None
+    ) -> "pa.Table | None":
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -229,9 +231,9 @@ class StudyFolder:
         """Return what blocks could not do in the runs of some parts, by default of all."""
         parts = []
         for name in self.part_names() if names is None else names:
-            table = self._sealed(self.parts / f"{name}.parquet", name, ["cell"])
+            table = self._read_sealed(self.parts / f"{name}.parquet", name, ["cell"])
             parts.append({} if table is None else undone_of(table))
-        return added(parts)
+        return add_counts(parts)
 
     @property
     def destination(self) -> Parts:
@@ -291,11 +293,11 @@ class StudyFolder:
 
     def write_table(self, name: str, content: bytes) -> None:
         """Write a table beside the parts, sealed as one of this study."""
-        self.write_file(name, sealed(content, self._owner(name)))
+        self.write_file(name, seal(content, self._owner(name)))
 
     def table(self, name: str) -> "pa.Table | None":
         """Return a table beside the parts; None if it is not there or not of this study."""
-        table = self._sealed(self.path / name, name, None)
+        table = self._read_sealed(self.path / name, name, None)
         return None if table is None else table.replace_schema_metadata(None)
 
 

@@ -4,7 +4,7 @@ import math
 import re
 
 from dsa_des.record.drawing import figure_text
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 #: How units at the end of a name are written.
 _UNITS = {
@@ -35,24 +35,24 @@ class AxisName(str):
 
 def unit_of(name: str) -> str:
     """Return ``m`` for ``declaration_range_m.radar``; nothing for a pure number."""
-    return _split(name.partition(".")[0])[1]
+    return _split_unit(name.partition(".")[0])[1]
 
 
 def readable(name: str) -> str:
     """Return ``Declaration range, radar (m)`` for ``declaration_range_m.radar``."""
     words, _, who = name.partition(".")
-    words, unit = _split(words)
-    what = _capital(_spaced(words)) + (f", {_spaced(who)}" if who else "")
+    words, unit = _split_unit(words)
+    what = _capital(_add_spaces(words)) + (f", {_add_spaces(who)}" if who else "")
     return figure_text(f"{what} ({unit})" if unit else what, 60)
 
 
 def axis_label(key: str) -> str:
     """Return ``Radar scan rate (Hz)`` for ``radar.scan_rate_hz``, ``Type of fusion`` for a swap."""
     if key.startswith("swap."):
-        return figure_text(f"Type of {_spaced(key.removeprefix('swap.'))}", 60)
+        return figure_text(f"Type of {_add_spaces(key.removeprefix('swap.'))}", 60)
     key = key.words if isinstance(key, AxisName) else key
-    words, unit = _split(key.removeprefix("blocks."))
-    label = _capital(_spaced(words.replace(".", " ")))
+    words, unit = _split_unit(key.removeprefix("blocks."))
+    label = _capital(_add_spaces(words.replace(".", " ")))
     return figure_text(f"{label} ({unit})" if unit else label, 60)
 
 
@@ -60,8 +60,8 @@ def value_label(axis: str, value: object) -> str:
     """Return ``radar scan rate 5 Hz`` for a value of an axis; a text is its own label."""
     if not isinstance(value, int | float):
         return figure_text(value)
-    words, unit = _split(axis.words if isinstance(axis, AxisName) else axis)
-    name = _spaced(words.replace(".", " "))
+    words, unit = _split_unit(axis.words if isinstance(axis, AxisName) else axis)
+    name = _add_spaces(words.replace(".", " "))
     # However long the name is, the value stands behind it.
     return f"{figure_text(name, 50)} {value:g}{'' if unit in ('', '°') else ' '}{unit}"
 
@@ -70,7 +70,7 @@ def short(value: object) -> str:
     """Return a value for a table: numbers to five digits."""
     if isinstance(value, float):
         return "-" if value != value else f"{value:.5g}"
-    return shortened(value)
+    return shorten(value)
 
 
 def rounded_to(half: float, *numbers: float) -> list[str]:
@@ -79,7 +79,7 @@ def rounded_to(half: float, *numbers: float) -> list[str]:
     return [f"{round(number, places) + 0.0:,.{max(places, 0)}f}" for number in numbers]
 
 
-def signed(value: float, half: float) -> str:
+def format_with_interval(value: float, half: float) -> str:
     """Return ``+1.24 ± 0.13``; three digits of a difference without an interval."""
     sign = "+" if value > 0 else ""
     if not 0.0 < half < math.inf:
@@ -87,7 +87,7 @@ def signed(value: float, half: float) -> str:
     return sign + " ± ".join(rounded_to(half, value, half))
 
 
-def _split(name: str) -> tuple[str, str]:
+def _split_unit(name: str) -> tuple[str, str]:
     """Return a name without its unit, and the unit as it is written."""
     match = _PER.search(name)
     if match:
@@ -103,7 +103,7 @@ def _split(name: str) -> tuple[str, str]:
 _ITEM = re.compile(r"(\w+?)s?\[(\d+)\]")
 
 
-def _spaced(name: str) -> str:
+def _add_spaces(name: str) -> str:
     name = _ITEM.sub(lambda match: f"{match[1]} {int(match[2]) + 1}", name)
     words = name.replace("_", " ").split(" ")
     return " ".join(word.upper() if _short(word) else word for word in words)

@@ -99,15 +99,15 @@ class MeasuredErrors(StrictRecord):
 
 def read_explained(folder: StudyFolder) -> Explained | None:
     """Return the models of a folder's runs; None where it holds no record that can be used."""
-    return _read(folder, EXPLAINED, Explained)
+    return _read_record(folder, EXPLAINED, Explained)
 
 
 def read_errors(folder: StudyFolder) -> MeasuredErrors | None:
     """Return the errors that a folder holds; None where it holds none that can be used."""
-    return _read(folder, ERRORS, MeasuredErrors)
+    return _read_record(folder, ERRORS, MeasuredErrors)
 
 
-def _read(folder: StudyFolder, name: str, model: type[_Record]) -> _Record | None:
+def _read_record(folder: StudyFolder, name: str, model: type[_Record]) -> _Record | None:
     try:
         return model.model_validate_json(read_regular(folder.path / name, _MOST_BYTES))
     except (OSError, ValidationError):

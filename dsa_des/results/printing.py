@@ -8,10 +8,10 @@ from typing import Any
 from dsa_des.record.undone import undone_sentences
 from dsa_des.results.labels import rounded_to, short
 from dsa_des.results.statistics import Estimate
-from dsa_des.results.summary import Answer, Compared, Line, one_sided
+from dsa_des.results.summary import Answer, Compared, Line, one_sided_confidence
 from dsa_des.results.tables import Tables, cut_off_text
 from dsa_des.terminal.tables import print_table
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 _LONGEST = 300
 #: Lines of a table that are printed.
@@ -26,7 +26,7 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     study = tables.record
     lines = tables.shown_lines(only)
     level = f"{100 * study.confidence:g} %"
-    unit = "encounters" if study.over else "replicas"
+    unit = "encounters" if study.sample_columns else "replicas"
     expected = any(line.expected is not None for line in lines)
     headings = [*tables.rows.axes, "result", "mean or share", "cut off", f"{level} interval", unit]
     headings += ["without"]
@@ -34,7 +34,7 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     for line in lines[:_MOST_SHOWN]:
         e = line.estimate
         cut_off = cut_off_text(line)
-        value, interval = rounded(e)
+        value, interval = round_estimate(e)
         row = [*map(short, line.at), line.result.name, value]
         row += [f"({cut_off})" if cut_off else "", interval, str(e.count)]
         row += ["" if sum(many for _, many in line.cut_off) >= line.missing else str(line.missing)]
@@ -44,8 +44,8 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     headings += ["analytic"] if expected else []
     notes = {result.name: result.meaning for result in tables.results}
     group = len(tables.rows.axes)
-    print_table(console, shortened(study.title), headings, rows, group=group, notes=notes)
-    if study.over:
+    print_table(console, shorten(study.title), headings, rows, group=group, notes=notes)
+    if study.sample_columns:
         console.print(
             "intervals are over encounters like these, of which each counts once, whatever its "
             "replicas"
@@ -78,11 +78,11 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     if len(lines) < len(tables.lines):
         console.print("all results: summary.parquet, or dsa-des study show FOLDER")
     for sentence in undone_sentences(tables.folder.undone()):
-        console.print(shortened(sentence, _LONGEST), markup=False, soft_wrap=True)
+        console.print(shorten(sentence, _LONGEST), markup=False, soft_wrap=True)
     if tables.rows.failed:
         console.print(f"{tables.rows.failed} runs failed; `error` and `command` of parts/ say why")
         first = str(tables.rows.stored.failed[0]["error"])
-        console.print(shortened(f"the first: {first}", _LONGEST), markup=False, soft_wrap=True)
+        console.print(shorten(f"the first: {first}", _LONGEST), markup=False, soft_wrap=True)
     if tables.rows.crashed:
         console.print(
             f"{tables.rows.crashed} of them crashed: the process that ran them died each time; "
@@ -98,13 +98,13 @@ ANSWER_HEADS = (
 
 
 def answer_cells(tables: Tables, answer: Answer) -> list[str]:
-    """Return the cells of what a requirement comes to, as `ANSWER_HEADS` names them."""
+    """Return the table cells of a requirement's finding, in the order of `ANSWER_HEADS`."""
     estimate = answer.line.estimate
     notes = ["uneven: a cheaper one meets it, a dearer one does not"] if answer.uneven else []
     notes += ["few"] if estimate.few else []
     return [
         answer.requirement.text(), answer.requirement.axis, tables.other_values(answer),
-        "none" if answer.value is None else short(answer.value), *rounded(estimate),
+        "none" if answer.value is None else short(answer.value), *round_estimate(estimate),
         "none" if answer.estimated is None else short(answer.estimated),
         "; ".join(notes),
     ]  # fmt: skip
@@ -113,7 +113,7 @@ def answer_cells(tables: Tables, answer: Answer) -> list[str]:
 def _show_answers(console: Any, tables: Tables) -> None:
     """Print the cheapest value that meets each requirement, by the values of the other axes."""
     rows = [answer_cells(tables, answer) for answer in tables.answers[:_MOST_SHOWN]]
-    sure = f"{100 * one_sided(tables.record.confidence):g} %"
+    sure = f"{100 * one_sided_confidence(tables.record.confidence):g} %"
     print_table(console, f"cheapest that meets a limit, {sure} sure", ANSWER_HEADS, rows, group=0)
     if any(answer.value is None for answer in tables.answers):
         console.print(
@@ -207,10 +207,10 @@ def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
         d = item.difference
         only = f"{d.only_first}/{d.only_second}" if d.only_first or d.only_second else ""
         rows.append(
-            [short(item.value), *map(short, item.at), item.result.name, *rounded(d.paired),
-             str(d.paired.count), only, rounded(d.unpaired)[1].rstrip(" *")]
+            [short(item.value), *map(short, item.at), item.result.name, *round_estimate(d.paired),
+             str(d.paired.count), only, round_estimate(d.unpaired)[1].rstrip(" *")]
         )  # fmt: skip
-    title = f"less the same at {shortened(axis)} = {short(baseline)}, pair by pair"
+    title = f"less the same at {shorten(axis)} = {short(baseline)}, pair by pair"
     print_table(console, title, headings, rows, group=1 + len(others))
     if tables.record.compare_weight is not None:
         _show_event_ratios(console, tables, shown)
@@ -231,7 +231,7 @@ def _show_event_ratios(console: Any, tables: Tables, shown: Sequence[Compared]) 
     ]  # fmt: skip
     if rows:
         console.print()
-        title = f"events by those at {shortened(axis)} = {short(baseline)}, weighted by "
+        title = f"events by those at {shorten(axis)} = {short(baseline)}, weighted by "
         headings = [axis, *others, "event", "ratio", "interval", "unresolved", "induced",
                  "effective size", ""]  # fmt: skip
         print_table(console, title + str(tables.record.compare_weight), headings, rows,
@@ -245,7 +245,7 @@ def interval_text(estimate: Estimate) -> str:
     return f"{short(estimate.low)} to {short(estimate.high)}" + (" *" if estimate.few else "")
 
 
-def rounded(estimate: Estimate) -> tuple[str, str]:
+def round_estimate(estimate: Estimate) -> tuple[str, str]:
     """Return a value and its interval, rounded to two digits of half the interval."""
     value, low, high = (
         0.0 if abs(number) < _NOTHING else number

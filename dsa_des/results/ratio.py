@@ -38,7 +38,12 @@ import numpy.typing as npt
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.errors import shown_value
-from dsa_des.results.statistics import gamma_interval, resampled_ratios, scaled, unseen_event
+from dsa_des.results.statistics import (
+    gamma_interval,
+    resampled_ratios,
+    scale_by_power_of_two,
+    unseen_event,
+)
 
 #: Intervals: by gamma distributions, of the logarithm of the ratio by its standard error, or of
 #: drawn sets of encounters.
@@ -145,8 +150,10 @@ def paired_ratio(
     """
     n = _flags("nominal", nominal)
     s = None if stands_for is None else _expansions(stands_for, len(n))
-    m = _flown(mitigated, s)
-    w, _ = scaled(_weights(weight, len(n)))  # all that follows is of weights relative to each other
+    m = _flags_flown(mitigated, s)
+    w, _ = scale_by_power_of_two(
+        _weights(weight, len(n))
+    )  # all that follows is of weights relative to each other
     if len(m) != len(n):
         raise ValueError(f"nominal has {len(n)} encounters and mitigated {len(m)}")
     if method not in METHODS:
@@ -156,7 +163,7 @@ def paired_ratio(
     if resamples < 2:
         raise ValueError(f"resamples = {resamples}: must be 2 or more")
     d = None if s is None or predicted is None else _flags("predicted", predicted)
-    y = w * _expanded(m, s, d)
+    y = w * _expansion_factors(m, s, d)
     terms = _terms(w, w * n, y, cluster)
     total, below = math.fsum(w), math.fsum(w * n)
     squares = math.fsum(terms[0] ** 2)
@@ -164,15 +171,15 @@ def paired_ratio(
     sizes = total * total / squares if squares > 0.0 else 0.0
     if below == 0.0:
         nan = math.nan
-        why = _why_none(n, total)
+        why = _explain_none(n, total)
         share = (0.0, math.fsum(y) / total) if total > 0.0 else (nan, nan)
         return PairedRatio(
             nan, nan, nan, nan, (nan, nan), nan, sizes, *counts, *share, method, why,
             clusters=len(terms[0]),
-            flown=_many_flown(n, s),
+            flown=_count_flown(n, s),
         )  # fmt: skip
     above = math.fsum(y)
-    induced = _expanded(np.maximum(m - n, 0.0), s, None if d is None else d * (n == 0.0))
+    induced = _expansion_factors(np.maximum(m - n, 0.0), s, None if d is None else d * (n == 0.0))
     added = max(0.0, math.fsum(w * induced))
     left, ratio = above - added, above / below
     each, x, y = terms
@@ -217,17 +224,17 @@ def _gain(
     `sampled` is the sum of the squared residuals of clusters. Encounters are drawn independently,
     so what those of a cluster have in common is as much with all of them flown.
     """
-    flown = _many_flown(nominal, stands_for)
+    flown = _count_flown(nominal, stands_for)
     if stands_for is None:
         return flown, 1.0
-    each = (weight * (_expanded(mitigated, stands_for, predicted) - ratio * nominal)) ** 2
+    each = (weight * (_expansion_factors(mitigated, stands_for, predicted) - ratio * nominal)) ** 2
     plain = math.fsum(stands_for * (weight * (mitigated - ratio * nominal)) ** 2)
     plain += sampled - math.fsum(each)
     cost = flown / len(nominal) + FORESEEN_COST
     return flown, plain / (sampled * cost) if sampled > 0.0 else math.nan
 
 
-def _many_flown(nominal: FloatArray, stands_for: FloatArray | None) -> int:
+def _count_flown(nominal: FloatArray, stands_for: FloatArray | None) -> int:
     return len(nominal) if stands_for is None else int(np.count_nonzero(stands_for))
 
 
@@ -278,13 +285,13 @@ def influences(
     """
     n = _flags("nominal", nominal)
     s = None if stands_for is None else _expansions(stands_for, len(n))
-    m, (w, _) = _flown(mitigated, s), scaled(_weights(weight, len(n)))
+    m, (w, _) = _flags_flown(mitigated, s), scale_by_power_of_two(_weights(weight, len(n)))
     d = None if s is None or predicted is None else _flags("predicted", predicted)
-    result: FloatArray = w * (_expanded(m, s, d) - ratio * n) / math.fsum(w * n)
+    result: FloatArray = w * (_expansion_factors(m, s, d) - ratio * n) / math.fsum(w * n)
     return result
 
 
-def _expanded(
+def _expansion_factors(
     flags: FloatArray, stands_for: FloatArray | None, predicted: FloatArray | None
 ) -> FloatArray:
     """Return what each encounter counts with above the line, but for its weight."""
@@ -294,8 +301,8 @@ def _expanded(
     return result if predicted is None else result + (1.0 - stands_for) * predicted
 
 
-def taken_over(stands_for: FloatArray, lost: Sequence[float], of: BoolArray) -> FloatArray:
-    """Return for how many runs each one stands where some that were flown gave no result.
+def redistribute_lost(stands_for: FloatArray, lost: Sequence[float], of: BoolArray) -> FloatArray:
+    """Return how many runs each run represents, where some that were flown gave no result.
 
     These leave out themselves, as in any study; the others for which they were to stand are shared
     by those flown `of` the same cell. `lost` says for how many each stood, NaN of one of which that
@@ -352,7 +359,7 @@ def _expansions(stands_for: npt.ArrayLike, count: int) -> FloatArray:
     return result
 
 
-def _flown(mitigated: npt.ArrayLike, stands_for: FloatArray | None) -> FloatArray:
+def _flags_flown(mitigated: npt.ArrayLike, stands_for: FloatArray | None) -> FloatArray:
     """Return the mitigated flags, 0 of those that were not flown."""
     if stands_for is None:
         return _flags("mitigated", mitigated)
@@ -381,7 +388,7 @@ def _refuse(what: str, values: FloatArray, bad: AnyArray, allowed: str) -> None:
         raise ValueError(f"{what} of encounter {index} is {shown}: {allowed}")
 
 
-def _why_none(nominal: FloatArray, total: float) -> str:
+def _explain_none(nominal: FloatArray, total: float) -> str:
     if total == 0.0:
         return "there is no encounter" if len(nominal) == 0 else "all weights are 0"
     if nominal.any():

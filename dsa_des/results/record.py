@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from dsa_des.text.run_commands import as_text, run_command
+from dsa_des.text.run_commands import format_value, run_command
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -145,7 +145,7 @@ class Result:
         return -math.inf if low is None else low, math.inf if high is None else high
 
     @property
-    def summed_up(self) -> bool:
+    def is_summarised(self) -> bool:
         """Whether a summary has a mean, a share or a ratio of it; names have none."""
         return self.kind not in (CLASS, KEY)
 
@@ -184,7 +184,7 @@ class Requirement:
         """Return ``nmac_risk_ratio at most 0.3``."""
         return f"{self.metric} at {'most' if self.below else 'least'} {self.limit:g}"
 
-    def met(self, low: float, high: float) -> bool:
+    def is_met(self, low: float, high: float) -> bool:
         """Return whether an interval (or a value, given twice) lies within the limit."""
         return high <= self.limit if self.below else low >= self.limit
 
@@ -308,7 +308,7 @@ class StudyRecord(StudyHead):
         )
 
     @property
-    def over(self) -> tuple[str, ...]:
+    def sample_columns(self) -> tuple[str, ...]:
         """Columns of axes that are a sample."""
         return tuple(axis.column for axis in self.axes if axis.over)
 
@@ -325,7 +325,7 @@ class StudyRecord(StudyHead):
         for axis, index in zip(self.axes, indices, strict=True):
             swaps += axis.swaps[index]
             sets += axis.sets[index]
-        sets += [(draw.key, as_text(row[draw.column])) for draw in self.draws]
+        sets += [(draw.key, format_value(row[draw.column])) for draw in self.draws]
         return swaps, sets
 
 

@@ -26,12 +26,12 @@ from dsa_des.results.models import (
     read_explained,
     versions,
 )
-from dsa_des.results.printing import RATIO_HEADS, interval_text, ratio_cells, rounded
+from dsa_des.results.printing import RATIO_HEADS, interval_text, ratio_cells, round_estimate
 from dsa_des.results.record import EVENT, FRACTION, NUMBER, RATIO
-from dsa_des.results.summary import Answer, Line, one_sided
+from dsa_des.results.summary import Answer, Line, one_sided_confidence
 from dsa_des.results.tables import Tables, cut_off_text
 from dsa_des.text.run_commands import run_command
-from dsa_des.text.safe_text import printable, shortened
+from dsa_des.text.safe_text import printable, shorten
 
 REPORT = "report.html"
 _LARGEST_PICTURE = 20 * 2**20
@@ -65,7 +65,7 @@ def study_report(folder: StudyFolder) -> bytes:
         title=record.title,
         tables=tables, record=record, explained=explained, errors=read_errors(folder),
         explain=explain, most=_MOST_ROWS, runs=len(tables.rows.places) + tables.rows.failed,
-        version=begun.get("dsa_des", now.get("dsa_des", "")), asked=_asked(tables),
+        version=begun.get("dsa_des", now.get("dsa_des", "")), asked=_requested_rows(tables),
         axes=[
             (axis_label(AxisName(axis.column, axis.words)), ", ".join(map(_value, axis.values[:40]))
              + ", …" * (len(axis.values) > 40),
@@ -89,12 +89,12 @@ def study_report(folder: StudyFolder) -> bytes:
         axis_heads=list(map(axis_label, tables.rows.axes)),
         ratio_heads=list(RATIO_HEADS), pivots=_pivots(tables),
         ratios=[(*map(_value, r.at), *ratio_cells(r)) for r in tables.ratios()[:_MOST_ROWS]],
-        sure=f"{100 * one_sided(record.confidence):g} %",
+        sure=f"{100 * one_sided_confidence(record.confidence):g} %",
         others=[axis_label(n) for n in tables.rows.axes
                 if tables.baseline and n != tables.baseline[0]],
         differences=[
             (*map(_value, item.at), _value(item.value), _value(item.baseline),
-             readable(item.result.name), *rounded(item.difference.paired),
+             readable(item.result.name), *round_estimate(item.difference.paired),
              item.difference.paired.count)
             for item in tables.compared[:_MOST_ROWS]
             if item.result in {line.result for line in tables.shown_lines()}
@@ -127,11 +127,11 @@ def page_environment() -> Environment:
     )
     environment.filters.update(
         verbatim=_verbatim,
-        filled=_filled,
+        filled=_drop_empty_columns,
         plain=Markup,
         axis=axis_label,
         models=_models,
-        measured=_measured,
+        measured=_error_rows,
         effects=_effects,
     )
     return environment
@@ -141,10 +141,12 @@ def _text(value: Any) -> Markup:
     """Return a value as text of a page, on one line and of bounded length."""
     if isinstance(value, Markup):
         return value
-    return Markup(escape(shortened(printable(str(value)), _LONGEST)))
+    return Markup(escape(shorten(printable(str(value)), _LONGEST)))
 
 
-def _filled(table: tuple[Iterable[Any], Iterable[Any]]) -> tuple[list[Any], list[list[Any]]]:
+def _drop_empty_columns(
+    table: tuple[Iterable[Any], Iterable[Any]],
+) -> tuple[list[Any], list[list[Any]]]:
     """Return heads and rows of a table without the columns in which nothing stands."""
     heads, rows = list(table[0]), [list(row) for row in table[1]]
     kept = [k for k in range(len(heads)) if any(str(row[k]) for row in rows)]
@@ -160,7 +162,7 @@ def _verbatim(lines: Iterable[str]) -> Markup:
 def _line(line: Line, exact: bool = False) -> tuple[Any, ...]:
     """Return one line of the summary as the cells of a row: rounded, or with the table's name."""
     e = line.estimate
-    said = (readable(line.result.name), *rounded(e))
+    said = (readable(line.result.name), *round_estimate(e))
     if exact:
         said = (line.result.name, short(e.value), interval_text(e))
     return (
@@ -222,7 +224,7 @@ def _cheapest(answer: Answer) -> str:
     return " ".join([sure, *notes])
 
 
-def _asked(tables: Tables) -> list[tuple[str, Any]]:
+def _requested_rows(tables: Tables) -> list[tuple[str, Any]]:
     record = tables.record
     rows: list[tuple[str, Any]] = [
         ("replicas of each cell", record.replicas),
@@ -240,7 +242,7 @@ def _models(scene: SceneRecord) -> list[tuple[str, ...]]:
     return [(m.block, m.type, m.about, "; ".join(m.rungs)) for m in scene.models]
 
 
-def _measured(errors: MeasuredErrors) -> list[tuple[Any, ...]]:
+def _error_rows(errors: MeasuredErrors) -> list[tuple[Any, ...]]:
     return [
         (e.block, f"{e.ladder}: {e.rung}", f"{e.quantity}, {e.unit}", short(e.mean), short(e.p95),
          short(e.largest), e.target_scans,

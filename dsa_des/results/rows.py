@@ -24,7 +24,7 @@ from dsa_des.results.differences import (
     ratio_difference,
 )
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.ratio import PairedRatio, paired_ratio, sampled_share, taken_over
+from dsa_des.results.ratio import PairedRatio, paired_ratio, redistribute_lost, sampled_share
 from dsa_des.results.record import (
     CRASHED,
     EVENT,
@@ -83,7 +83,7 @@ class StoredRows:
         rows = max(1, folder.record.cells * folder.record.replicas)
         self._at_once = max(3, _MOST_HELD_BYTES // (8 * rows))
         others = [name for name in self.names if name not in _PLACE]
-        self._read([*_PLACE, *others[: self._at_once - len(_PLACE)]], look=True)
+        self._read_columns([*_PLACE, *others[: self._at_once - len(_PLACE)]], look=True)
 
     def __len__(self) -> int:
         return self._count
@@ -93,11 +93,11 @@ class StoredRows:
         if name not in self._held:
             index = self.names.index(name)
             others = [n for n in self.names[index:] if n not in self._held]
-            self._read(others[: self._at_once], look=False)
+            self._read_columns(others[: self._at_once], look=False)
         self._held.move_to_end(name)
         return self._held[name]
 
-    def _read(self, names: Sequence[str], *, look: bool) -> None:
+    def _read_columns(self, names: Sequence[str], *, look: bool) -> None:
         """Read columns of all parts; `look` also at what became of the runs."""
         while self._held and len(self._held) + len(names) > self._at_once:
             self._held.popitem(last=False)
@@ -111,12 +111,12 @@ class StoredRows:
             for name, result in pieces.items():
                 result.append(_codes(kept[name].combine_chunks()))
         if look:
-            cell, replica = (_joined(pieces[name]) for name in _PLACE)
+            cell, replica = (_concatenate(pieces[name]) for name in _PLACE)
             self._count = len(cell)
             later = (np.diff(cell) > 0) | ((np.diff(cell) == 0) & (np.diff(replica) > 0))
             self._order = None if later.all() else np.lexsort((replica, cell))
         for name in names:
-            column = _joined(pieces.pop(name))
+            column = _concatenate(pieces.pop(name))
             self._held[name] = column if self._order is None else column[self._order]
 
     def _look(self, table: "pa.Table", good: BoolArray) -> None:
@@ -149,7 +149,7 @@ def _codes(values: "pa.Array") -> Any:
     return values.to_numpy(zero_copy_only=False)
 
 
-def _joined(pieces: list[Any]) -> AnyArray:
+def _concatenate(pieces: list[Any]) -> AnyArray:
     import pyarrow as pa
 
     if isinstance(pieces[0], np.ndarray):
@@ -191,10 +191,10 @@ class Rows:
             return None
         result = self.column(STANDS_FOR)
         for cell, lost in self.stored.unheard.items():
-            result = taken_over(result, lost, self.column("cell") == cell)
+            result = redistribute_lost(result, lost, self.column("cell") == cell)
         return result
 
-    def predicted(self, event: str, rows: IntArray) -> FloatArray | None:
+    def predicted_events(self, event: str, rows: IntArray) -> FloatArray | None:
         """Return with what an event counts in some rows before they are flown, if with anything."""
         name = geometry_column(predicted_column(event))
         return np.nan_to_num(self.column(name)[rows]) if name in self.stored.names else None
@@ -226,7 +226,7 @@ class Rows:
             at = tuple(_plain(self.column(name)[rows[0]]) for name in self.axes)
             yield at, rows
 
-    def against(
+    def comparisons_with_baseline(
         self, axis: str, baseline: Any
     ) -> Iterator[tuple[Any, tuple[Any, ...], IntArray, IntArray]]:
         """Give each place off an axis's baseline that has a place there to be compared with.
@@ -258,7 +258,7 @@ class Rows:
             ratio, missing = self.ratio(result, rows, confidence, method)
             return estimate_of(ratio), missing
         if self.is_sampled(result.name):
-            return self._sampled_share(result, rows, confidence)
+            return self._estimate_sampled_share(result, rows, confidence)
         values = self.column(result.name)[rows].astype(float)
         missing = int(np.isnan(values).sum())
         if result.kind not in (EVENT, SHARE):
@@ -280,7 +280,7 @@ class Rows:
         tried = np.bincount(index, weights=trials, minlength=len(units))
         return share(won.astype(float), tried.astype(float), confidence), missing
 
-    def _sampled_share(
+    def _estimate_sampled_share(
         self, result: Result, rows: IntArray, confidence: float
     ) -> tuple[Estimate, int]:
         """Return how often an event happens of which only some runs, drawn for it, know."""
@@ -290,7 +290,7 @@ class Rows:
         ratio = sampled_share(
             np.ones(int(known.sum())), values[known], np.ones(int(known.sum())),
             stands_for[known], cluster=self.units[rows][known],
-            predicted=self.predicted(result.name, rows[known]), confidence=confidence,
+            predicted=self.predicted_events(result.name, rows[known]), confidence=confidence,
         )  # fmt: skip
         return estimate_of(ratio), int((~known).sum())
 
@@ -301,7 +301,7 @@ class Rows:
 
         Runs of the same encounter, and of the same unit, hang together.
         """
-        terms, used, missing = self._paired(result, rows)
+        terms, used, missing = self._ratio_terms(result, rows)
         below, above, weight, cluster, stands_for, predicted = terms
         method = "bootstrap" if method == "bootstrap" else "gamma"
         together = cluster if len(np.unique(cluster)) < len(used) else None
@@ -318,7 +318,7 @@ class Rows:
             ratio = replace(ratio, interval=(low, min(high, 1.0)))
         return ratio, missing
 
-    def _paired(self, result: Result, rows: IntArray) -> tuple[RatioTerms, IntArray, int]:
+    def _ratio_terms(self, result: Result, rows: IntArray) -> tuple[RatioTerms, IntArray, int]:
         """Return the columns of a ratio over the rows that have all of them, and those rows."""
         of = result.ratio
         assert of is not None
@@ -338,8 +338,8 @@ class Rows:
             if self.over:  # one encounter's number means another in another file
                 _, number = np.unique(cluster, return_inverse=True)
                 cluster = units * (int(number.max(initial=0)) + 1) + number
-        predicted = self.predicted(of.above, rows)
-        terms = RatioTerms(below, above, weight, cluster, stands_for, predicted).of(known)
+        predicted = self.predicted_events(of.above, rows)
+        terms = RatioTerms(below, above, weight, cluster, stands_for, predicted).select_runs(known)
         return terms, rows[known], int((~known).sum())
 
     def common(self, first: IntArray, second: IntArray) -> tuple[IntArray, IntArray]:
@@ -348,7 +348,7 @@ class Rows:
         _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
         return first[here], second[there]
 
-    def paired(
+    def paired_values(
         self, name: str, first: IntArray, second: IntArray
     ) -> tuple[IntArray, FloatArray, FloatArray]:
         """Return the units that both sets of rows have, and the values of each in both."""
@@ -361,7 +361,7 @@ class Rows:
         """Return how a result differs between two conditions, on the runs that both have."""
         if result.kind == RATIO:
             return self._ratio_difference(result, first, second, confidence)
-        _, one, two = self.paired(result.name, first, second)
+        _, one, two = self.paired_values(result.name, first, second)
         if result.quantile is not None:
             return quantile_difference(one, two, result.quantile, confidence)
         return difference(one, two, confidence, method, kind=result.kind)
@@ -369,10 +369,12 @@ class Rows:
     def _ratio_difference(
         self, result: Result, first: IntArray, second: IntArray, confidence: float
     ) -> EstimatedDifference:
-        (one, mine, _), (two, other, _) = (self._paired(result, rows) for rows in (first, second))
+        (one, mine, _), (two, other, _) = (
+            self._ratio_terms(result, rows) for rows in (first, second)
+        )
         _, here, there = np.intersect1d(self.runs[mine], self.runs[other], return_indices=True)
         alone = len(mine) - len(here), len(other) - len(there)
-        return ratio_difference(one.of(here), two.of(there), alone, confidence)
+        return ratio_difference(one.select_runs(here), two.select_runs(there), alone, confidence)
 
     def cut_off(self, result: Result, rows: IntArray) -> tuple[tuple[str, int], ...]:
         """Return where the run cut a result off in some rows, and in how many, sorted."""

@@ -40,7 +40,7 @@ class Estimate:
         return (self.high - self.low) / 2.0
 
 
-def within(result: Estimate, least: float | None, most: float | None) -> Estimate:
+def clip_estimate(result: Estimate, least: float | None, most: float | None) -> Estimate:
     """Return an estimate whose interval holds nothing that no value can be."""
     low = result.low if least is None else max(least, result.low)
     high = result.high if most is None else min(most, result.high)
@@ -105,11 +105,11 @@ def share(successes: FloatArray, trials: FloatArray, confidence: float) -> Estim
     elif clustered:
         effective = float(units)
     low, high = wilson(value * effective, effective, confidence)
-    few = effective < FEW or (clustered and _rests_on_few(successes, trials))
+    few = effective < FEW or (clustered and _has_few_units(successes, trials))
     return Estimate(value, low, high, units, few)
 
 
-def _rests_on_few(successes: FloatArray, trials: FloatArray) -> bool:
+def _has_few_units(successes: FloatArray, trials: FloatArray) -> bool:
     """Return whether few units say how trials hang together: few in all, or few unlike the rest."""
     unlike = min(np.count_nonzero(successes < trials), np.count_nonzero(successes > 0))
     return bool(len(trials) < FEW or unlike < FEW_UNLIKE)
@@ -126,7 +126,7 @@ def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
     count = len(values)
     if count == 0:
         return Estimate(math.nan, math.nan, math.nan, 0, True)
-    part, exponent = scaled(values)
+    part, exponent = scale_by_power_of_two(values)
     value = math.ldexp(math.fsum(part) / count, exponent)
     if count == 1:
         return Estimate(value, math.nan, math.nan, 1, True)
@@ -210,13 +210,13 @@ def normal_error(estimate: Estimate, confidence: float) -> float:
 def standard_error(values: FloatArray) -> float:
     """Return the standard error of a mean."""
     count = len(values)
-    part, exponent = scaled(values)
+    part, exponent = scale_by_power_of_two(values)
     middle = math.fsum(part) / count
     error = math.sqrt(math.fsum((part - middle) ** 2) / (count - 1) / count)
     return math.ldexp(error, exponent)
 
 
-def scaled(values: FloatArray) -> tuple[FloatArray, int]:
+def scale_by_power_of_two(values: FloatArray) -> tuple[FloatArray, int]:
     """Return values divided by a power of two, the largest then below 1, and its exponent.
 
     The division is exact, so what is computed of them has the same digits; but sums and squares of
@@ -340,19 +340,19 @@ def gamma_interval(
     def below_it(limit: float) -> float:
         """Return how sure it is that the ratio is below a limit."""
         went, stay = sums(limit)
-        return _surely_more(went, (stay[0] + more[0], stay[1] + more[1]))
+        return _probability_of_more(went, (stay[0] + more[0], stay[1] + more[1]))
 
     def above_it(limit: float) -> float:
         went, stay = sums(limit)
         had = limit * heaviest
-        return _surely_more(stay, (went[0] + had, went[1] + had * had))
+        return _probability_of_more(stay, (went[0] + had, went[1] + had * had))
 
     sure = 1.0 - tail
-    low = 0.0 if ratio == 0.0 else _where(above_it, sure, ratio, 0.5)
-    return low, _where(below_it, sure, ratio or 1.0 / len(x), 2.0)
+    low = 0.0 if ratio == 0.0 else _bisect_ratio(above_it, sure, ratio, 0.5)
+    return low, _bisect_ratio(below_it, sure, ratio or 1.0 / len(x), 2.0)
 
 
-def _surely_more(one: tuple[float, float], other: tuple[float, float]) -> float:
+def _probability_of_more(one: tuple[float, float], other: tuple[float, float]) -> float:
     """Return the probability that a gamma variable is larger than another: means and variances."""
     from scipy.special import betainc
 
@@ -363,7 +363,9 @@ def _surely_more(one: tuple[float, float], other: tuple[float, float]) -> float:
     return float(betainc(shapes[1], shapes[0], scales[0] / (scales[0] + scales[1])))
 
 
-def _where(certainty: Callable[[float], float], sure: float, start: float, factor: float) -> float:
+def _bisect_ratio(
+    certainty: Callable[[float], float], sure: float, start: float, factor: float
+) -> float:
     """Return the ratio from which on a limit further out is sure, by halving its logarithm."""
     inner = outer = start
     while certainty(outer) < sure:

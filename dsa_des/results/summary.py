@@ -16,7 +16,7 @@ from dsa_des.results.record import (
     Result,
 )
 from dsa_des.results.rows import Rows
-from dsa_des.results.statistics import Estimate, within
+from dsa_des.results.statistics import Estimate, clip_estimate
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def summarise(
     lines = []
     for at, chosen in rows.each_place():
         for result in results:
-            if not result.summed_up:
+            if not result.is_summarised:
                 continue
             ratio = other = None
             if result.kind == RATIO:
@@ -60,7 +60,7 @@ def summarise(
                     other, _ = rows.ratio(result, chosen, confidence, "bootstrap")
             else:
                 estimate, missing = rows.estimate(result, chosen, confidence, method)
-                estimate = within(estimate, result.least, result.most)
+                estimate = clip_estimate(estimate, result.least, result.most)
             known = expected.get((result.name, at))
             cut_off = rows.cut_off(result, chosen)
             lines.append(
@@ -92,9 +92,9 @@ def compare_axis(
     that weighs units in ratios of events.
     """
     compared = []
-    for value, others, base, chosen in rows.against(axis, baseline):
+    for value, others, base, chosen in rows.comparisons_with_baseline(axis, baseline):
         for result in results:
-            if not result.summed_up or result.quantile is not None:
+            if not result.is_summarised or result.quantile is not None:
                 continue  # paired differences are of means
             if result.kind != RATIO and rows.is_sampled(result.name):
                 continue  # other runs were flown here than there
@@ -159,13 +159,13 @@ def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]
     for at, some in by_others.items():
         dearest_first = some if requirement.cheap_last else some[::-1]
         sure = [
-            not line.estimate.few and requirement.met(line.estimate.low, line.estimate.high)
+            not line.estimate.few and requirement.is_met(line.estimate.low, line.estimate.high)
             for line in dearest_first
         ]
         likely = [
-            requirement.met(line.estimate.value, line.estimate.value) for line in dearest_first
+            requirement.is_met(line.estimate.value, line.estimate.value) for line in dearest_first
         ]
-        last, guess = _run(sure), _run(likely)
+        last, guess = _count_leading(sure), _count_leading(likely)
         sentences.append(
             Answer(
                 requirement, at,
@@ -178,17 +178,17 @@ def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]
     return sentences
 
 
-def _run(good: Sequence[bool]) -> int:
-    """Return how many stand before the first that is false."""
+def _count_leading(good: Sequence[bool]) -> int:
+    """Return the number of leading values that are true."""
     return next((k for k, one in enumerate(good) if not one), len(good))
 
 
-def one_sided(confidence: float) -> float:
+def one_sided_confidence(confidence: float) -> float:
     """Return how sure one end of a two-sided interval is."""
     return 0.5 + confidence / 2.0
 
 
-def of_series(metric: str, names: Iterable[str]) -> dict[str, float]:
+def results_of_series(metric: str, names: Iterable[str]) -> dict[str, float]:
     """Return the results ``METRIC.5``, ``METRIC.10`` ... with the number of each, ascending."""
     numbers = {}
     for name in names:

@@ -14,10 +14,10 @@ from dsa_des.results.summary import (
     Line,
     answers,
     compare_axis,
-    one_sided,
+    one_sided_confidence,
     summarise,
 )
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 _MOST_SCATTERS = 6
 SUMMARY, DIFFERENCES, RATIOS = "summary.parquet", "differences.parquet", "ratios.parquet"
@@ -39,7 +39,7 @@ class Tables:
         self.record = record
         self.results = record.results
         axes = [AxisName(axis.column, axis.words) for axis in record.axes]
-        self.rows = Rows(StoredRows(folder), axes, record.over)
+        self.rows = Rows(StoredRows(folder), axes, record.sample_columns)
         self.lines: list[Line] = summarise(
             self.rows, self.results, record.confidence, record.interval,
             self._earlier() if expected is None else expected,
@@ -105,7 +105,7 @@ class Tables:
     def _ratio_columns(self) -> dict[str, list[Any]]:
         """Return all numbers of the ratios, with both kinds of interval."""
         lines = self.ratios()
-        columns = _at(self.rows.axes, lines) | _columns(lines, result="result.name")
+        columns = _values_at(self.rows.axes, lines) | _columns(lines, result="result.name")
         names = (
             "ratio", "unresolved", "induced", "effective_sample_size", "encounters", "clusters",
             "nominal_events", "mitigated_events", "induced_events", "nominal_probability",
@@ -126,7 +126,7 @@ class Tables:
 
     def _summary_columns(self) -> dict[str, list[Any]]:
         return {
-            **_at(self.rows.axes, self.lines),
+            **_values_at(self.rows.axes, self.lines),
             **_columns(
                 self.lines, result="result.name", value="estimate.value", low="estimate.low",
                 high="estimate.high", count="estimate.count", missing="missing",
@@ -149,7 +149,7 @@ class Tables:
             "axis": [item.requirement.axis for item in result],
             "others": [self.other_values(item) for item in result],
             "cheapest": [None if item.value is None else short(item.value) for item in result],
-            "confidence": [one_sided(self.record.confidence)] * len(result),
+            "confidence": [one_sided_confidence(self.record.confidence)] * len(result),
             "cheapest_by_estimate": [
                 None if item.estimated is None else short(item.estimated) for item in result
             ],
@@ -164,7 +164,7 @@ class Tables:
         axis = self.baseline[0]
         others = [name for name in self.rows.axes if name != axis]
         return {
-            **_at(others, self.compared),
+            **_values_at(others, self.compared),
             **_columns(self.compared, **{axis: "value"}),
             **_columns(
                 self.compared, baseline="baseline", result="result.name",
@@ -192,12 +192,12 @@ class Tables:
 
 def cut_off_text(line: Line) -> str:
     """Return ``12 of 200 at the start, 3 never``; nothing where the run cut nothing off."""
-    texts = [f"{many:,} {shortened(where)}" for where, many in line.cut_off]
+    texts = [f"{many:,} {shorten(where)}" for where, many in line.cut_off]
     texts[:1] = [text.replace(" ", f" of {line.runs:,} ", 1) for text in texts[:1]]
     return ", ".join(texts)
 
 
-def _at(axes: Sequence[str], items: Sequence[Any]) -> dict[str, list[Any]]:
+def _values_at(axes: Sequence[str], items: Sequence[Any]) -> dict[str, list[Any]]:
     """Return the values of some axes at items that are `at` them."""
     return {name: [item.at[k] for item in items] for k, name in enumerate(axes)}
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from dsa_des.block.component import Component, Consumer, Context, Producer
-from dsa_des.block.foreign_calls import REFUSALS, error_text, must_pass, why_refused
+from dsa_des.block.foreign_calls import REFUSALS, describe_error, error_text, is_stop_request
 from dsa_des.errors import BlockFailure, Problem, RunRefused, SceneError, SetupFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.effects import Planned, WrapEffect, build_effects
@@ -52,7 +52,7 @@ class Assembly:
         self._refuse_late_changes()
         #: Blocks that move what carries others, and the names of that.
         self._sources = {n: names for n, c in self.components.items() if (names := c.platforms())}
-        self._put_on_platforms()
+        self._assign_platforms()
         #: Blocks that go on by what their neighbours said at first, and the stretch from which on
         #: these say otherwise: they do not say what they remember.
         self.unheard: dict[str, int] = {}
@@ -69,7 +69,7 @@ class Assembly:
         for name in self._scenes[number].blocks:
             if not number or self._differs(name, number):
                 with self._preparing(name, problems):
-                    components[name] = self._made(name, number)
+                    components[name] = self._make_component(name, number)
             else:
                 components[name] = before[name]
         _raise_any(problems)
@@ -85,7 +85,7 @@ class Assembly:
             return True
         return block.cls.remembers is not None and scene.sections != before.sections
 
-    def _made(self, name: str, number: int) -> Component:
+    def _make_component(self, name: str, number: int) -> Component:
         scene, timeline, recorder = self._scenes[number], self._timeline, self._recorder
         context = Context(
             timeline.streams,
@@ -103,7 +103,7 @@ class Assembly:
     def _duration(self) -> Fraction:
         if self._scene.duration_s is not None:
             return self._scene.duration_s
-        lengths = [self._asked(one, "natural_duration_s") for one in self.components.values()]
+        lengths = [self._call_method(one, "natural_duration_s") for one in self.components.values()]
         known = [length for length in lengths if length is not None]
         if not known:
             message = "is required: no block of this scene has a length of its own"
@@ -121,7 +121,7 @@ class Assembly:
                 message = f"something changes at {float(stretch.from_s):g} s, beyond {ends_s}"
                 raise SceneError([self._scene.problem("changes", message)])
 
-    def _put_on_platforms(self) -> None:
+    def _assign_platforms(self) -> None:
         """Tell every block what carries it, which no change alters."""
         self.platforms = platforms_of(self._scene, self._sources)
         for components in self.stretches:
@@ -150,27 +150,27 @@ class Assembly:
             ]
             if number and components[name] is self.stretches[number - 1][name]:
                 told_by = components[name]
-                if _same(producers, told_by.context.producers):
+                if _is_equal(producers, told_by.context.producers):
                     continue
                 if type(components[name]).remembers is None:
                     self.unheard.setdefault(name, number)
                     continue
                 problems: list[Problem] = []
                 with self._preparing(name, problems):
-                    components[name] = self._made(name, number)
+                    components[name] = self._make_component(name, number)
                 _raise_any(problems)
                 components[name].context.platform = told_by.context.platform
             components[name].context.producers = producers
 
     def _offer(self, wire: Wire, components: Mapping[str, Component]) -> Any:
         """Return what is offered over a wire, as what carries the receiver has it."""
-        offer = self._asked(components[wire.source], "offer", wire.output)
+        offer = self._call_method(components[wire.source], "offer", wire.output)
         carrying = components[wire.target].context.platform
         if offer is not None and carrying in self._sources.get(wire.source, ()):
             return offer.seen_from(carrying)
         return offer
 
-    def _each(self, name: str) -> list[Component]:
+    def _instances_of(self, name: str) -> list[Component]:
         """Return the instances of a block, each once, in order of time."""
         return list({id(of[name]): of[name] for of in self.stretches}.values())
 
@@ -200,7 +200,7 @@ class Assembly:
         problems: list[Problem] = []
         for name in sorted(self.components, key=lambda name: (-self._place[name], name)):
             consumers = self._consumers(name)
-            each = self._each(name)
+            each = self._instances_of(name)
             for component in each:
                 component.context.consumers = consumers
                 with self._preparing(name, problems):
@@ -217,11 +217,11 @@ class Assembly:
         for wire in self._scene.wires:
             if wire.source == name:
                 of_wire: list[Consumer] = []
-                for target in self._each(wire.target):
-                    asked = self._asked(target, "request", wire.input)
+                for target in self._instances_of(wire.target):
+                    asked = self._call_method(target, "request", wire.input)
                     platform = target.context.platform
                     consumer = Consumer(wire.target, wire.input, asked, platform)
-                    if not any(_same(consumer, one) for one in of_wire):
+                    if not any(_is_equal(consumer, one) for one in of_wire):
                         of_wire.append(consumer)
                 consumers += of_wire
         return consumers
@@ -234,14 +234,14 @@ class Assembly:
         except (SceneError, BlockFailure, RunRefused):
             raise
         except REFUSALS as error:
-            problems.append(self._scene.refused(name, why_refused(error)))
+            problems.append(self._scene.setup_refusal(name, describe_error(error)))
         except BaseException as error:
-            if must_pass(error):
+            if is_stop_request(error):
                 raise
             path = self._scene.blocks[name].cls.path()
             raise SetupFailure(name, path, 0.0, None, error_text(error)) from error
 
-    def _asked(self, component: Component, what: str, *arguments: Any) -> Any:
+    def _call_method(self, component: Component, what: str, *arguments: Any) -> Any:
         """Return what a method of a block returns before the run."""
         problems: list[Problem] = []
         answer = None
@@ -251,7 +251,7 @@ class Assembly:
         return answer
 
 
-def _same(one: Any, other: Any) -> bool:
+def _is_equal(one: Any, other: Any) -> bool:
     """Return whether two words of blocks say the same; not where they cannot be compared."""
     try:
         return bool(one == other)

@@ -77,7 +77,7 @@ class Channel:
         """Take note from now on of when what is pushed arrives."""
         self._pushed = []
 
-    def earliest_pushed(self) -> int | None:
+    def first_pushed_arrival(self) -> int | None:
         """Return the first arrival of what was pushed since `watch`, or None."""
         return min(self._pushed) if self._pushed else None
 
@@ -96,7 +96,7 @@ class Channel:
             arrivals = arrivals.later(self.delay_ticks)
         if self._faults is not None:
             made = message.instants
-            kept = np.flatnonzero(self._faults.kept(made))
+            kept = np.flatnonzero(self._faults.is_kept(made))
             arrivals, message = arrivals.take(kept), message.take(kept)
             arrivals = arrivals.later(self._faults.lateness(made.take(kept)))
             if (order := arrivals.order()) is not None:
@@ -130,19 +130,19 @@ class Channel:
             if len(part.tick):
                 arriving.append(part)
         if not arriving:
-            return RunTicks.none()
+            return RunTicks.empty()
         if self._faults is None and 1 in (len(arriving), len(self._runs.going)):
-            return RunTicks.joined(arriving)
+            return RunTicks.concatenate(arriving)
         return union(arriving)  # late rows overtake and may coincide
 
-    def none_before(self) -> int:
+    def quiet_until(self) -> int:
         """Return a tick before which nothing arrives of what waits."""
         return min((int(arrivals.tick.min()) for arrivals, _ in self._waiting), default=MAX_TICK)
 
     def _due(self, arrivals: RunTicks, end: int) -> int | BoolArray:
         """Return how many rows arrive before `end`, or which, if they are not the first ones."""
         if len(self._runs.going) == 1:
-            return arrivals.at_most(end)
+            return arrivals.count_before_end(end)
         if end >= self._runs.run_ticks:
             return len(arrivals)
         due = arrivals.tick < end
@@ -178,12 +178,12 @@ class Channel:
                 break  # rows behind these arrive later still
         left.extend(self._waiting)
         self._waiting = left
-        collected = joined(taken)
+        collected = concatenate(taken)
         if collected is not None and len(taken) > 1:
-            collected = _in_order(collected)
+            collected = _sort_rows(collected)
         if collected is None or not self._runs.early:
             return collected
-        collected = _rows(*collected, self._runs.before_ends(collected[0]))
+        collected = _rows(*collected, self._runs.is_before_ends(collected[0]))
         return collected if len(collected[0]) else None
 
     def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
@@ -199,12 +199,12 @@ class Channel:
                 # What was before need not be looked up.
                 self._pass(new, end)
                 return new[1], rows
-        before = joined(self._passed)
-        parts = [] if before is None else [_lasts(*_in_order(before))]
-        held = joined(parts if new is None else [*parts, new])
+        before = concatenate(self._passed)
+        parts = [] if before is None else [_lasts(*_sort_rows(before))]
+        held = concatenate(parts if new is None else [*parts, new])
         if held is None:
             return None
-        held = _in_order(held)
+        held = _sort_rows(held)
         self._passed = [held]
         if self._runs.count > 1:
             self._remember(end)
@@ -215,14 +215,14 @@ class Channel:
         if self._runs.count == 1:
             self._passed = [new]
             return
-        if self._of_all(new[0]):  # nothing older is held by any run that goes
+        if self._has_all_runs(new[0]):  # nothing older is held by any run that goes
             stop = self._runs.going.stop
             self._passed = [part for part in self._passed if part[0].run[-1] >= stop]
         self._passed.append(new)
         if len(self._passed) > _MOST_PASSED or end >= self._runs.run_ticks:
             self._remember(end)
 
-    def _of_all(self, arrivals: RunTicks) -> bool:
+    def _has_all_runs(self, arrivals: RunTicks) -> bool:
         """Whether there is a row of every run that goes on."""
         runs = self._runs.going
         if len(runs) == 1:
@@ -239,8 +239,8 @@ class Channel:
         runs = self._runs.going
         first = runs.stop if end >= self._runs.run_ticks else runs.start
         going = [part for part in self._passed if part[0].run[-1] >= first]
-        held = joined(going)
-        self._passed = [] if held is None else [_lasts(*_in_order(held))]
+        held = concatenate(going)
+        self._passed = [] if held is None else [_lasts(*_sort_rows(held))]
 
 
 def _rows(arrivals: RunTicks, message: Message, kept: BoolArray) -> Rows:
@@ -254,26 +254,26 @@ def _lasts(arrivals: RunTicks, message: Message) -> Rows:
     """Return the last row of each run."""
     if len(arrivals) == 1:
         return arrivals, message
-    if arrivals.one_run:
+    if arrivals.is_one_run:
         last = slice(len(arrivals) - 1, None)
         return arrivals.take(last), message.take(last)
     lasts = arrivals.last_of_each
     return arrivals.take(lasts), message.take(lasts)
 
 
-def _in_order(rows: Rows) -> Rows:
+def _sort_rows(rows: Rows) -> Rows:
     """Put rows in order; what arrives at one instant stays in the order given."""
     order = rows[0].order()
     return rows if order is None else (rows[0].take(order), rows[1].take(order))
 
 
-def joined(parts: Sequence[Rows]) -> Rows | None:
+def concatenate(parts: Sequence[Rows]) -> Rows | None:
     """Return the rows of all parts as one, in the order given, or None without any."""
     if not parts:
         return None
     if len(parts) == 1:
         return parts[0]
-    arrivals = RunTicks.joined([part[0] for part in parts])
+    arrivals = RunTicks.concatenate([part[0] for part in parts])
     message = type(parts[0][1]).concatenate([part[1] for part in parts])
     return arrivals, message
 
@@ -301,12 +301,12 @@ class Inputs:
         runs: Runs | None = None,
     ) -> None:
         every = [(port, wire) for port in declared for wire in wires.get(port, ())]
-        self._held = [(p, wire, declared[p].required) for p, wire in every if declared[p].held]
-        self._queued = [(p, wire) for p, wire in every if not declared[p].held]
+        self._held = [(p, wire, declared[p].required) for p, wire in every if declared[p].is_held]
+        self._queued = [(p, wire) for p, wire in every if not declared[p].is_held]
         self._ticks_per_s = ticks_per_s
         self._runs = Runs() if runs is None else runs
 
-    def seen(
+    def wake_at(
         self,
         asked: RunTicks,
         scans: IntArray,
@@ -329,7 +329,7 @@ class Inputs:
             sample = wire.sample(asked, end)
             if sample is not None:
                 held[port] = sample
-            if required and complete and _some_missing(sample):
+            if required and complete and _has_missing(sample):
                 absent = np.ones(len(asked), bool) if sample is None else sample[1] < 0
                 missing = absent if missing is None else missing | absent
         if missing is not None:  # before the first messages
@@ -349,7 +349,7 @@ class Inputs:
         return Wake(asked, scans, per_s, held, arrived, rows, first, clock, idle)
 
 
-def _some_missing(sample: tuple[Message, IntArray] | None) -> bool:
+def _has_missing(sample: tuple[Message, IntArray] | None) -> bool:
     if sample is None:
         return True
     rows = sample[1]

@@ -54,7 +54,7 @@ def plan(
     `everything`, all are built that can be parametrised neutrally.
     """
     verdicts = [(effect, effect.verdict(block)) for effect in type(block).effects]
-    allowed = {} if everything else _within(verdicts, tolerance)
+    allowed = {} if everything else _effects_within_tolerance(verdicts, tolerance)
     planned = []
     for effect, verdict in verdicts:
         built, because = verdict.simulated, verdict.because
@@ -75,7 +75,7 @@ def build_effects(
 ) -> list[Planned]:
     """Decide which of a block's effects are built, as `plan`, and give them to its context."""
     planned = plan(block, tolerance, everything=everything)
-    built = {item: _built(block, item.effect) for item in planned if item.built}
+    built = {item: _build_effect(block, item.effect) for item in planned if item.built}
     if not everything:
         block.context.tolerance = unspent(planned, tolerance)
     block.context.effects = {
@@ -85,7 +85,7 @@ def build_effects(
     return planned
 
 
-def _built(block: Component, effect: Effect[Any]) -> Any:
+def _build_effect(block: Component, effect: Effect[Any]) -> Any:
     """Return what an effect builds; ValueError where the block could not use it."""
     value = effect.build(block)
     for hook in block.all_hooks():
@@ -108,7 +108,7 @@ def unspent(planned: Sequence[Planned], tolerance: Mapping[str, float]) -> dict[
     return left
 
 
-def _within(
+def _effects_within_tolerance(
     verdicts: Sequence[tuple[Effect, Verdict]], tolerance: Mapping[str, float]
 ) -> dict[str, str]:
     """Return the effects whose bounds together stay within the tolerance, and why each."""
@@ -174,7 +174,7 @@ OF_CLOCKS = (
 
 
 def timing_plan(scene: Scene, *, everything: bool = False) -> list[Planned]:
-    """Return what became of each timing effect: one entry for each place where it is simulated.
+    """Return the verdict on each timing effect, one entry for each block or wire that it acts on.
 
     Where a scene calls for an effect nowhere, or only in some places, one entry speaks for all
     the others.
@@ -188,11 +188,11 @@ def timing_plan(scene: Scene, *, everything: bool = False) -> list[Planned]:
     planned: list[Planned] = []
     for effects, places in ((OF_BLOCKS, blocks), (OF_WIRES, wires), (OF_CLOCKS, clocks)):
         for effect in effects:
-            planned += _judged(effect, places, everything)
+            planned += _plan_key(effect, places, everything)
     return planned
 
 
-def _judged(effect: _OfKey, places: list[tuple[str, Any]], everything: bool) -> Iterator[Planned]:
+def _plan_key(effect: _OfKey, places: list[tuple[str, Any]], everything: bool) -> Iterator[Planned]:
     verdicts = [(place, effect.verdict(thing)) for place, thing in places]
     for place, verdict in verdicts:
         if verdict.simulated:
@@ -231,20 +231,22 @@ class WireFaults:
     drops: Stream
     ticks_per_s: int
 
-    def kept(self, made: RunTicks) -> BoolArray:
+    def is_kept(self, made: RunTicks) -> BoolArray:
         """Return which rows made at some instants are not lost."""
-        return self._drawn(self.drops, made) >= self.drop_probability[self._stretch(made)]
+        return self._draw_delays(self.drops, made) >= self.drop_probability[self._stretch(made)]
 
     def lateness(self, made: RunTicks) -> IntArray:
         """Return the extra delay of rows made at some instants, in ticks."""
         of = self._stretch(made)
-        drawn = np.rint(self._drawn(self.jitter, made) * self.jitter_ticks[of]).astype(np.int64)
+        drawn = np.rint(self._draw_delays(self.jitter, made) * self.jitter_ticks[of]).astype(
+            np.int64
+        )
         return self.late_ticks[of] + drawn
 
     def _stretch(self, made: RunTicks) -> IntArray:
         of: IntArray = np.searchsorted(self.from_ticks, made.tick, side="right") - 1
         return of
 
-    def _drawn(self, stream: Stream, sent: RunTicks) -> FloatArray:
+    def _draw_delays(self, stream: Stream, sent: RunTicks) -> FloatArray:
         instant = nanosecond_of(sent.tick, self.ticks_per_s)
         return stream.of_runs(sent.run, instant).uniform(instant.astype(np.uint64), 0)

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 import simpy
 
-from dsa_des.arrays.run_ticks import RunTicks, no_runs
+from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.wake import Wake
 from dsa_des.record.recording import Recorder
@@ -124,7 +124,7 @@ class BlockEnvironment:
 
         It sets out later, where `leaves` is a later tick: before any block runs then.
         """
-        self._node.send(result, RunTicks(no_runs(1), self.tick_array()), leaves)
+        self._node.send(result, RunTicks(runs_of_single(1), self.tick_array()), leaves)
 
     def tick_array(self) -> np.ndarray:
         """Return the current tick as the ``tick`` of a one-row message."""

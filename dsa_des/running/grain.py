@@ -9,9 +9,9 @@ import networkx as nx
 from dsa_des.block.component import Component, ends_its_run
 from dsa_des.errors import SceneError
 from dsa_des.errors.budgets import MOST_SCANS
-from dsa_des.running.loops import Edge, before_loops, cut_loops, opened_loops, shortest_s
+from dsa_des.running.loops import Edge, blocks_before_loops, cut_loops, opened_loops, shortest_s
 from dsa_des.running.node import Node
-from dsa_des.scene.graph import in_cycles, queue_key, window_order, with_queues
+from dsa_des.scene.graph import cycle_numbers, queue_key, window_order, with_queues
 from dsa_des.scene.queue_policy import QueuePolicy, find_policy
 from dsa_des.scene.scene import Scene
 from dsa_des.time.run_clock import RunClock
@@ -31,7 +31,7 @@ def _without_windows(scene: Scene) -> dict[str, str]:
     return reasons
 
 
-def _hurried(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
+def _hurried_blocks(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
     """Return the blocks that send over the wires that are shorter than scans are apart."""
     stuck = sorted(name for name, cls in scene.classes.items() if not cls.rewindable)
     clocks = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
@@ -51,13 +51,13 @@ def windowed_blocks(scene: Scene, queues: Collection[str]) -> set[str]:
     itself windowed, have no process of its own, queue for no shared processor but those in
     `queues`, be in no feedback loop, and be fed by windowed blocks only.
     """
-    looped = in_cycles(scene.graph)
+    looped = cycle_numbers(scene.graph)
     windowed: set[str] = set()
     for name in nx.topological_sort(scene.graph.subgraph(set(scene.graph) - looped.keys())):
         processor = scene.blocks[name].options.processor
         alone = not processor or processor in queues
         before = scene.graph.predecessors(name)
-        if alone and _takes_windows(scene.classes[name]) and windowed.issuperset(before):
+        if alone and _can_take_windows(scene.classes[name]) and windowed.issuperset(before):
             windowed.add(name)
     return windowed
 
@@ -73,7 +73,7 @@ def windowed_queues(scene: Scene) -> set[str]:
     policies = {name: find_policy(p.when_busy) for name, p in scene.processors.items()}
     able = {name for name, policy in policies.items() if policy.skips is QueuePolicy.skips}
     while able:
-        looped = in_cycles(with_queues(scene.graph, {name: queues[name] for name in able}))
+        looped = cycle_numbers(with_queues(scene.graph, {name: queues[name] for name in able}))
         windowed = windowed_blocks(scene, able)
         left = {n for n in able if queue_key(n) not in looped and windowed.issuperset(queues[n])}
         if left == able:
@@ -125,40 +125,40 @@ def grain_of(scene: Scene, window: int | None) -> Grain:
     if window == 1:
         return Grain(set(), False, set(), {})
     slow: dict[str, str] = {}
-    if in_cycles(scene.graph):
+    if cycle_numbers(scene.graph):
         slow, opened, every = _without_windows(scene), opened_loops(scene), set(scene.blocks)
         # Who looks ahead of a run's end must not fail there.
         ending = any(ends_its_run(cls) for cls in scene.classes.values())
-        ahead = before_loops(scene.graph)
+        ahead = blocks_before_loops(scene.graph)
         if not slow and all(cls.rewindable for cls in scene.classes.values()):
             return Grain(every, True, cut_loops(scene.graph, scene.classes), {}, ahead=ahead)
-        slow = slow or _hurried(scene, opened)
+        slow = slow or _hurried_blocks(scene, opened)
         if not slow:
             return Grain(every, False, opened, {}, ahead=set() if ending else ahead)
     queues = {name: scene.queues[name] for name in sorted(windowed_queues(scene))}
     windowed = windowed_blocks(scene, queues)
-    return Grain(windowed, False, set(), slow or _holding_back(scene, windowed), queues)
+    return Grain(windowed, False, set(), slow or _holding_blocks(scene, windowed), queues)
 
 
-def kept_back(scene: Scene, windowed: Collection[str]) -> list[str]:
+def blocks_held_back(scene: Scene, windowed: Collection[str]) -> list[str]:
     """Return the blocks that could look ahead, but for others."""
     classes = scene.classes
-    return sorted(n for n in scene.blocks if _takes_windows(classes[n]) and n not in windowed)
+    return sorted(n for n in scene.blocks if _can_take_windows(classes[n]) and n not in windowed)
 
 
-def _holding_back(scene: Scene, windowed: Collection[str]) -> dict[str, str]:
+def _holding_blocks(scene: Scene, windowed: Collection[str]) -> dict[str, str]:
     """Return the blocks behind which others run scan by scan, and why each does."""
-    kept = set(kept_back(scene, windowed))
+    kept = set(blocks_held_back(scene, windowed))
     return {
         name: why
         for name, why in _without_windows(scene).items()
         if name not in windowed
-        and not _takes_windows(scene.classes[name])
+        and not _can_take_windows(scene.classes[name])
         and kept & nx.descendants(scene.graph, name)
     }
 
 
-def _takes_windows(cls: type[Component]) -> bool:
+def _can_take_windows(cls: type[Component]) -> bool:
     return cls.windowed and cls.process is None
 
 

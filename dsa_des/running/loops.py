@@ -7,7 +7,7 @@ from typing import Any
 import networkx as nx
 
 from dsa_des.block.component import Component
-from dsa_des.scene.graph import in_cycles, window_order
+from dsa_des.scene.graph import cycle_numbers, window_order
 from dsa_des.scene.scene import Scene
 
 #: From which block to which.
@@ -19,7 +19,7 @@ def _closing(graph: nx.DiGraph, rank: Callable[[Edge], Any]) -> set[Edge]:
 
     An edge is taken out only if it closes a loop of edges of its rank or lower ones.
     """
-    looped = in_cycles(graph)
+    looped = cycle_numbers(graph)
     kept = nx.DiGraph()
     kept.add_nodes_from(looped)
     delayed = []
@@ -46,9 +46,9 @@ def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[
     return _closing(graph, lambda edge: _optional(graph, classes, edge))
 
 
-def before_loops(graph: nx.DiGraph) -> set[str]:
+def blocks_before_loops(graph: nx.DiGraph) -> set[str]:
     """Return the blocks that no loop leads to; none where there is no loop."""
-    looped = in_cycles(graph)
+    looped = cycle_numbers(graph)
     behind = set(looped).union(*(nx.descendants(graph, name) for name in looped))
     return set(graph) - behind if looped else set()
 
@@ -96,7 +96,7 @@ def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> 
 
     opened = nx.DiGraph(graph)
     for opens in (of_source, lambda edge: _optional(graph, classes, edge)):
-        looped = in_cycles(opened)
+        looped = cycle_numbers(opened)
         inside = [e for e in opened.edges if looped.get(e[0], -1) == looped.get(e[1], -2)]
         opened.remove_edges_from([edge for edge in inside if opens(edge)])
     return window_order(opened, set(graph), cut_loops(opened, classes))

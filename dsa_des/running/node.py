@@ -15,13 +15,13 @@ import simpy
 from dsa_des.arrays.run_ticks import (
     RunTicks,
     last_of_run,
-    no_runs,
     positions_among,
+    runs_of_single,
     union,
 )
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Component, RunEnd
-from dsa_des.block.foreign_calls import must_pass
+from dsa_des.block.foreign_calls import is_stop_request
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake, checked_messages
 from dsa_des.errors import RunRefused
@@ -43,7 +43,7 @@ class Demand:
     clock: RunClock
     lead_ticks: int
 
-    def between(self, start: int, end: int) -> RunTicks:
+    def instants_between(self, start: int, end: int) -> RunTicks:
         """Return the instants in [start, end) at which this block needs a row.
 
         None of these rows would arrive after the end of the run, where the clock has no scan.
@@ -145,7 +145,7 @@ class Node:
             self._bell = Bell(self.simulation.env)
             if self.windowed:
                 window = self.simulation.window
-                self._run_window(window.start, self._end_in(window))
+                self._run_window(window.start, self._window_end(window))
             else:
                 self._run_at(int(self.simulation.env.now))
 
@@ -157,7 +157,7 @@ class Node:
         except Abort:
             raise
         except BaseException as error:
-            if must_pass(error):
+            if is_stop_request(error):
                 raise
             ticks = np.array([int(self.simulation.env.now)], dtype=np.int64)
             self.simulation.fail(self, ticks, error)
@@ -168,7 +168,7 @@ class Node:
         out = {} if self.outages is None else self.outages.undone()
         if self.component.process is not None or not idle.any():
             return out
-        ports = [name for name in self.channels if self.component.inputs[name].held]
+        ports = [name for name in self.channels if self.component.inputs[name].is_held]
         why = f", for nothing came at {' and '.join(sorted(ports))}" if ports else ""
         never = np.array([idle, np.ones(len(idle))], dtype=np.int64)
         return {f"it never ran{why}": never, **out}
@@ -213,7 +213,7 @@ class Node:
         if self.processor is not None:
             self.processor.open_window(start, end)
         if self.windowed:
-            if self._end_in(window) > start:
+            if self._window_end(window) > start:
                 self.wake_at(start)
             return
         if self.clock is not None:
@@ -222,12 +222,12 @@ class Node:
             for tick in self._scan_at:
                 self.wake_at(tick)
         elif self.on_demand:
-            for tick in self._demanded(start, end).tick.tolist():
+            for tick in self._demanded_instants(start, end).tick.tolist():
                 self.wake_at(tick)
         for tick in self._pulses(start, end).tick.tolist():
             self.wake_at(tick)
 
-    def none_before(self, start: int, ahead: int) -> int:
+    def quiet_until(self, start: int, ahead: int) -> int:
         """Return a tick, at `start` or later, before which a block in windows does not run.
 
         It has come up to `ahead` if it runs ahead.
@@ -239,24 +239,24 @@ class Node:
         if self.pulse is not None:
             clocks.append((self.pulse, 0))
         ticks = [clock.none_before(start + lead) - lead for clock, lead in clocks]
-        ticks += [wire.none_before() for wire in self._trigger_wires]
+        ticks += [wire.quiet_until() for wire in self._trigger_wires]
         return max(start, min(ticks, default=MAX_TICK))
 
-    def _end_in(self, window: Window) -> int:
+    def _window_end(self, window: Window) -> int:
         """Return up to when it runs in a window."""
         return window.ahead if self.ahead else window.end
 
-    def _demanded(self, start: int, end: int) -> RunTicks:
-        return _all_of([demand.between(start, end) for demand in self.demands])
+    def _demanded_instants(self, start: int, end: int) -> RunTicks:
+        return _concatenate([demand.instants_between(start, end) for demand in self.demands])
 
     def _pulses(self, start: int, end: int) -> RunTicks:
-        return RunTicks.none() if self.pulse is None else self.pulse.between(start, end)[1]
+        return RunTicks.empty() if self.pulse is None else self.pulse.between(start, end)[1]
 
     # -- what ----------------------------------------------------------------------------------
 
     def _run_at(self, tick: int) -> None:
         runs = self.simulation.runs
-        if runs.early and runs.over(tick):
+        if runs.early and runs.is_over(tick):
             return
         scan = self._scan_at.get(tick, -1)
         idle = None
@@ -275,30 +275,30 @@ class Node:
         if self.clock is not None:
             scans, instants = self.clock.between(start, end)
         else:
-            instants = self._demanded(start, end) if self.on_demand else RunTicks.none()
-            scans = _no_scans(len(instants))
+            instants = self._demanded_instants(start, end) if self.on_demand else RunTicks.empty()
+            scans = _no_scan_numbers(len(instants))
         arrivals = [wire.next_arrivals(end) for wire in self._trigger_wires]
         if any(len(part.tick) for part in arrivals):
             own, numbers = instants, scans
-            instants = _all_of([own, *arrivals])
-            scans = _no_scans(len(instants))
+            instants = _concatenate([own, *arrivals])
+            scans = _no_scan_numbers(len(instants))
             if len(own) and self.clock is not None:
                 scans = scans.copy()
                 scans[last_of_run(instants, own)] = numbers
         idle = None
         if len(pulses := self._pulses(start, end)):
             busy = instants
-            instants = _all_of([busy, pulses])
+            instants = _concatenate([busy, pulses])
             idle = np.ones(len(instants), dtype=bool)
             if len(busy):
                 rows = last_of_run(instants, busy)
                 scans, numbers = np.full(len(instants), -1), scans
                 scans[rows], idle[rows] = numbers, False
             else:
-                scans = _no_scans(len(instants))
+                scans = _no_scan_numbers(len(instants))
         runs = self.simulation.runs
         if runs.early:
-            kept = runs.before_ends(instants)
+            kept = runs.is_before_ends(instants)
             instants, scans = instants.take(kept), scans[kept]
             idle = None if idle is None else idle[kept]
         if len(instants.tick):
@@ -313,18 +313,18 @@ class Node:
         self, instants: RunTicks, scans: IntArray, end: int, idle: BoolArray | None = None
     ) -> None:
         before = None if self.clock is None else self.clock.before
-        if self.outages is not None and not (up := self.outages.up(instants)).all():
+        if self.outages is not None and not (up := self.outages.is_up(instants)).all():
             instants, scans = instants.take(up), scans[up]
             idle = None if idle is None else idle[up]
             if not len(instants):
                 return
-        wake = self._inputs.seen(
-            instants, scans, end, self._rows_asked_for, clock=before, idle=idle
+        wake = self._inputs.wake_at(
+            instants, scans, end, self._demanded_rows, clock=before, idle=idle
         )
         if wake is None:
             return
         if self.outages is not None:
-            wake = self.outages.heard(wake)
+            wake = self.outages.drop_unheard(wake)
         ticks = wake.ticks
         if not self._all_ran:
             self._ran = ~self._idle_runs()
@@ -339,20 +339,20 @@ class Node:
         except (Abort, RunRefused):
             raise
         except BaseException as error:
-            if must_pass(error):
+            if is_stop_request(error):
                 raise
             self.simulation.fail(self, ticks, error, int(wake.scans[0]))
 
-    def _rows_asked_for(self, instants: RunTicks) -> Mapping[str, IntArray]:
+    def _demanded_rows(self, instants: RunTicks) -> Mapping[str, IntArray]:
         if not self.demands or self.clock is not None:
             return {}
         start, end = int(instants.tick[0]), int(instants.tick[-1]) + 1
         if self.windowed:  # clocks know the scans of the window: they were asked for before
             window = self.simulation.window
-            start, end = window.start, self._end_in(window)
+            start, end = window.start, self._window_end(window)
         rows = {}
         for demand in self.demands:
-            asked = demand.between(start, end)
+            asked = demand.instants_between(start, end)
             rows_asked, there = positions_among(instants, asked)
             rows[demand.block] = rows_asked if there is None else rows_asked[there]
         return rows
@@ -362,7 +362,7 @@ class Node:
         self._missed = False
         tick = int(self.simulation.env.now)
         scans = np.array([-1], dtype=np.int64)
-        wake = self._inputs.seen(_now(tick), scans, tick + 1, complete=False)
+        wake = self._inputs.wake_at(_now(tick), scans, tick + 1, complete=False)
         assert wake is not None
         return wake
 
@@ -382,11 +382,11 @@ class Node:
                 self.simulation.recorder.record(self.name, message)
             if leaves is not None and leaves > ran.tick[0]:
                 event = WakeUp(self.simulation.env, leaves - int(ran.tick[0]), LEAVE_PRIORITY)
-                event.callbacks.append(partial(self._hand_in, port, message, leaves))
+                event.callbacks.append(partial(self._deliver_to_port, port, message, leaves))
             else:
-                self._hand_in(port, message)
+                self._deliver_to_port(port, message)
 
-    def _hand_in(
+    def _deliver_to_port(
         self, port: str, message: Message, sent: int | None = None, event: Any = None
     ) -> None:
         if self.processor is None:
@@ -404,21 +404,21 @@ class Node:
                     node.wake_at(arrival)
 
 
-def _all_of(parts: Sequence[RunTicks]) -> RunTicks:
+def _concatenate(parts: Sequence[RunTicks]) -> RunTicks:
     """Return the instants of all parts."""
     filled = [part for part in parts if len(part.tick)]
     if len(filled) > 1:
         return union(filled)
-    return filled[0] if filled else RunTicks.none()
+    return filled[0] if filled else RunTicks.empty()
 
 
 #: The scan number at instants that are none of a block's own scans, seen as often as asked for.
 _NO_SCAN = np.broadcast_to(np.int64(-1), 1 << 40)
 
 
-def _no_scans(rows: int) -> IntArray:
+def _no_scan_numbers(rows: int) -> IntArray:
     return _NO_SCAN[:rows]
 
 
 def _now(tick: int) -> RunTicks:
-    return RunTicks(no_runs(1), np.array([tick], dtype=np.int64))
+    return RunTicks(runs_of_single(1), np.array([tick], dtype=np.int64))

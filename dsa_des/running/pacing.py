@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dsa_des.errors import UsageError
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 #: Wall time that a look-ahead window may stand for: what is simulated ahead stays below it, s.
 LONGEST_WAIT_S = 0.1
@@ -30,7 +30,7 @@ def parse_factor(text: str, option: str = "--realtime") -> float:
         factor = math.nan
     if not _SLOWEST <= factor <= _FASTEST:
         raise UsageError(
-            f"{option} {shortened(text, 80)}: must be a number above 0, from {_SLOWEST:g} to "
+            f"{option} {shorten(text, 80)}: must be a number above 0, from {_SLOWEST:g} to "
             f"{_FASTEST:g}: simulated seconds per second, 1 for the speed of the clock"
         )
     return factor

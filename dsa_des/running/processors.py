@@ -113,7 +113,7 @@ class _Entry:
     done: IntArray
 
     @classmethod
-    def of(cls, block: str, message: Message, deliver: Deliver) -> "_Entry":
+    def from_message(cls, block: str, message: Message, deliver: Deliver) -> "_Entry":
         first = np.flatnonzero(np.append(True, message.tick[1:] != message.tick[:-1]))
         done = np.full(len(first), _NEVER, dtype=np.int64)
         return cls(block, message, deliver, np.append(first, len(message)), done)
@@ -177,7 +177,7 @@ class Processor:
         self._free_from = 0
         #: What became of jobs since `close_window`: block, and the numbers of `_record_all`.
         self._notes: list[tuple[str, tuple[int, ...]]] = []
-        #: Entries of which something leaves, since `_hand_on`.
+        #: Entries of which something leaves, since `_send_done`.
         self._leaving: dict[_Entry, None] = {}
         #: In closed form, jobs that are done after the last window: entered, started, done, block.
         self._under_way = (*[np.empty(0, dtype=np.int64)] * 3, np.empty(0, dtype=object))
@@ -199,28 +199,28 @@ class Processor:
         wake_up.callbacks.append(lambda event: self._serve_window(end))
 
     def submit(self, block: str, message: Message, deliver: Deliver) -> None:
-        """Take what a block sent over one output; `deliver` is told when work on it ends."""
+        """Queue a block's message on one output; `deliver` is called when work on it ends."""
         if self._window_priority is None and not self._entries:
             WakeUp(self._env, 0, ENTRY_PRIORITY).callbacks.append(self._serve_instant)
-        self._entries.append(_Entry.of(block, message, deliver))
+        self._entries.append(_Entry.from_message(block, message, deliver))
 
-    def _entered(self) -> list[_Entry]:
+    def _take_entries(self) -> list[_Entry]:
         entries, self._entries = self._entries, []
         return sorted(entries, key=lambda entry: entry.block)
 
     # -- at an instant -------------------------------------------------------------------------
 
     def _serve_instant(self, event: simpy.Event) -> None:
-        entries, now = self._entered(), int(self._env.now)
+        entries, now = self._take_entries(), int(self._env.now)
         ticks = np.full(len(entries), now, dtype=np.int64)
         services = self._service.ticks([entry.block for entry in entries], ticks).tolist()
         jobs = zip(entries, services, strict=True)
         self._enter(now, [_Job(entry.block, now, service, entry) for entry, service in jobs])
-        self._hand_on()
+        self._send_done()
 
-    def _is_done(self, event: simpy.Event) -> None:
+    def _on_job_done(self, event: simpy.Event) -> None:
         self._finish(int(self._env.now))
-        self._hand_on()
+        self._send_done()
 
     # -- the line ------------------------------------------------------------------------------
 
@@ -229,7 +229,7 @@ class Processor:
             if self._policy.skips(self._working is not None or bool(self._line)):
                 self._note(job, now, SKIPPED)  # another block of this instant was first
                 continue
-            gone: Any = self._policy.dropped(tuple(self._line), job)
+            gone: Any = self._policy.jobs_to_drop(tuple(self._line), job)
             for left in gone:
                 if left is not job:
                     self._line.remove(left)
@@ -248,7 +248,7 @@ class Processor:
         job.entry.done[job.number] = self._free_from
         self._leaving[job.entry] = None
         if self._window_priority is None:
-            WakeUp(self._env, job.service, DONE_PRIORITY).callbacks.append(self._is_done)
+            WakeUp(self._env, job.service, DONE_PRIORITY).callbacks.append(self._on_job_done)
 
     def _finish(self, until: int) -> None:
         while self._working is not None and self._free_from <= until:
@@ -261,12 +261,12 @@ class Processor:
         self._notes.append((job.block, numbers))
 
     def close_window(self) -> None:
-        """Record what became of the jobs of a window."""
+        """Record when the jobs of a window entered, started and ended."""
         if notes := self._notes:
             self._notes = []
             self._record_all([block for block, _ in notes], *np.array([n for _, n in notes]).T)
 
-    def _hand_on(self) -> None:
+    def _send_done(self) -> None:
         """Send the jobs whose end is known."""
         leaving, self._leaving = self._leaving, {}
         for entry in leaving:
@@ -284,7 +284,7 @@ class Processor:
     # -- in a window ---------------------------------------------------------------------------
 
     def _serve_window(self, end: int) -> None:
-        entries = self._entered()
+        entries = self._take_entries()
         ticks = [entry.message.tick[entry.bounds[:-1]] for entry in entries]
         tick = np.concatenate([*ticks, np.empty(0, dtype=np.int64)])
         order = np.argsort(tick, kind="stable")  # blocks of one instant enter by name
@@ -295,7 +295,7 @@ class Processor:
         blocks = np.array([*(entry.block for entry in entries), ""], dtype=object)[of]
         service = self._service.ticks(blocks, tick)
         if type(self._policy) is QueuePolicy:
-            done = self._all_in_turn(tick, service, blocks, end)
+            done = self._end_ticks(tick, service, blocks, end)
             for n, entry in enumerate(entries):
                 entry.done[number[of == n]] = done[of == n]
                 entry.send()
@@ -306,9 +306,9 @@ class Processor:
             self._finish(now)
             self._enter(now, group)
         self._finish(end - 1)
-        self._hand_on()
+        self._send_done()
 
-    def _all_in_turn(
+    def _end_ticks(
         self, tick: IntArray, service: IntArray, blocks: np.ndarray, end: int
     ) -> IntArray:
         """Return when each job is done: it starts when it has entered and that before is done."""

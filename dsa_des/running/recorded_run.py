@@ -26,7 +26,7 @@ from dsa_des.running.simulation import Outcome, Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 _VERSIONS_OF = ("numpy", "scipy", "simpy", "pyarrow")
 
@@ -171,6 +171,6 @@ def _progress(simulation: Simulation, *, silent: bool) -> Iterator[Callable[[flo
         yield None
         return
     with terminal.progress("seconds") as bar:
-        title = shortened(simulation.scene.title)
+        title = shorten(simulation.scene.title)
         task = bar.add_task(title, total=float(simulation.duration_s))
         yield lambda time_s: bar.update(task, completed=time_s)

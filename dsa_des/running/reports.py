@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from dsa_des.block.component import RunEnd
-from dsa_des.block.entry_points import registered
-from dsa_des.block.foreign import installed
+from dsa_des.block.entry_points import entry_points_of
+from dsa_des.block.foreign import load_installed
 from dsa_des.record.run_folder import REPORTS
 from dsa_des.record.sinks import Observer, attempt
-from dsa_des.running.grain import kept_back
+from dsa_des.running.grain import blocks_held_back
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.graph import in_cycles
+from dsa_des.scene.graph import cycle_numbers
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 from dsa_des.time.clock import MOST_JITTER
 
 if TYPE_CHECKING:
@@ -39,15 +39,15 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
     for name, component in simulation.components.items():
         notes += [f"blocks.{name}: {text}" for text in component.p.without_effect()]
         for text in attempt(f"blocks.{name}: warnings", notes, component.warnings) or ():
-            notes.append(f"blocks.{name}: {shortened(str(text), _LONGEST)}")
+            notes.append(f"blocks.{name}: {shorten(str(text), _LONGEST)}")
         notes += [f"blocks.{name}: {text}" for text in _vain_times(simulation, name)]
-    notes += _in_vain(simulation)
-    for text in _of_stretches(simulation, notes):
+    notes += _notes_of_vain_work(simulation)
+    for text in _notes_of_stretches(simulation, notes):
         notes.append(text)
-    return _unacknowledged(scene, [*notes, *_slowed(simulation)])
+    return _drop_acknowledged(scene, [*notes, *_blocks_that_slow(simulation)])
 
 
-def _of_stretches(simulation: Simulation, said: list[str]) -> Iterator[str]:
+def _notes_of_stretches(simulation: Simulation, said: list[str]) -> Iterator[str]:
     """Yield what is to be noted of blocks only after something has changed."""
     scene = simulation.scene
     for number, stretch in enumerate(scene.stretches, start=1):
@@ -61,7 +61,7 @@ def _of_stretches(simulation: Simulation, said: list[str]) -> Iterator[str]:
             new = [text for text in texts if f"blocks.{name}: {text}" not in said]
             for text in (*notes, *new):
                 begins_s = f"from {float(stretch.from_s):g} s"
-                yield f"blocks.{name}: {begins_s}: {shortened(str(text), _LONGEST)}"
+                yield f"blocks.{name}: {begins_s}: {shorten(str(text), _LONGEST)}"
     for name, number in sorted(simulation.unheard.items()):
         yield (
             f"blocks.{name}: goes on by what its neighbours said at the start, though from "
@@ -70,7 +70,7 @@ def _of_stretches(simulation: Simulation, said: list[str]) -> Iterator[str]:
         )
 
 
-def _in_vain(simulation: Simulation) -> Iterator[str]:
+def _notes_of_vain_work(simulation: Simulation) -> Iterator[str]:
     """Say which blocks do again what another one does, or send to nobody what nothing records."""
     scene, graph = simulation.scene, simulation.scene.graph
     first: list[str] = []
@@ -113,12 +113,12 @@ def _vain_times(simulation: Simulation, name: str) -> Iterator[str]:
         yield f"latency_s is {float(latency_s):g}: nothing it sends arrives in {float(ends_s):g} s"
 
 
-def _slowed(simulation: Simulation) -> list[str]:
+def _blocks_that_slow(simulation: Simulation) -> list[str]:
     """Return which blocks keep others from looking ahead, in a loop or behind them."""
     scene = simulation.scene
-    looped = sorted(in_cycles(scene.graph))
+    looped = sorted(cycle_numbers(scene.graph))
     windowed = [name for name, node in simulation.nodes.items() if node.windowed]
-    kept = kept_back(scene, windowed)
+    kept = blocks_held_back(scene, windowed)
     # A window of a loop holds all blocks, so one outside of the loop counts as well.
     what = f"the feedback loop of {', '.join(looped)} runs" if looped else (
         f"{', '.join(kept)} run"
@@ -137,10 +137,10 @@ def notes_of_loading(scene: Scene) -> list[str]:
         block, _, parameter = key.rpartition(".")
         dropped.setdefault(block, []).append(parameter)
     swapped = [f"{block}: the swap dropped {', '.join(keys)}" for block, keys in dropped.items()]
-    return _unacknowledged(scene, [*swapped, *scene.notes])
+    return _drop_acknowledged(scene, [*swapped, *scene.notes])
 
 
-def _unacknowledged(scene: Scene, notes: list[str]) -> list[str]:
+def _drop_acknowledged(scene: Scene, notes: list[str]) -> list[str]:
     """Return notes without those that the blocks they are about acknowledge."""
     known = {f"blocks.{name}": block.options.acknowledged for name, block in scene.blocks.items()}
     return [
@@ -244,7 +244,7 @@ class Report(Protocol):
 
 def load_reports() -> list[Report]:
     """Return one instance of every registered report, in the order of their names."""
-    return [installed(point)() for point in registered(REPORTS).values()]
+    return [load_installed(point)() for point in entry_points_of(REPORTS).values()]
 
 
 def draw_all(

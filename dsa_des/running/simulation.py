@@ -17,11 +17,11 @@ import simpy
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, ends_its_run
-from dsa_des.block.foreign_calls import error_at, must_pass
+from dsa_des.block.foreign_calls import error_at, is_stop_request
 from dsa_des.block.message import Message
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import NotRecordedError, Recorder
-from dsa_des.record.undone import Undone, UndoneByRun, of_runs
+from dsa_des.record.undone import Undone, UndoneByRun, sum_runs
 from dsa_des.running.assembly import Assembly
 from dsa_des.running.effects import Planned, WrapEffect, timing_plan
 from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
@@ -62,7 +62,7 @@ class Outcome:
     @cached_property
     def undone(self) -> Undone:
         """What blocks could not do, over all runs."""
-        return of_runs(self.undone_by_run, slice(None))
+        return sum_runs(self.undone_by_run, slice(None))
 
     @cached_property
     def report(self) -> dict[str, Any]:
@@ -73,7 +73,7 @@ class Outcome:
                 for section, content in component.report().items():
                     sections.setdefault(section, {}).update(content)
             except BaseException as error:
-                if must_pass(error):
+                if is_stop_request(error):
                     raise
                 raise block_failure(component, self.duration_s, error) from error
         return sections
@@ -192,7 +192,7 @@ class Simulation:
             if self.runs.going != going:
                 going = self.runs.going
                 self._start(going)
-            if self.runs.over(window.start):
+            if self.runs.is_over(window.start):
                 if going.stop == self.runs.count:
                     break
                 self.windows.commit(window, None)  # nothing is left to run in it
@@ -238,7 +238,7 @@ class Simulation:
     def _next_instant(self, tick: int, ahead: int) -> int:
         soonest = MAX_TICK
         for node in self.nodes.values():
-            soonest = min(soonest, node.none_before(tick, ahead))
+            soonest = min(soonest, node.quiet_until(tick, ahead))
             if soonest <= tick:
                 break  # as most often
         return soonest
@@ -340,6 +340,6 @@ class Simulation:
 def block_failure(
     component: Component, time_s: float, error: BaseException, scan: int | None = None
 ) -> BlockFailure:
-    """Return what is said of an exception that a block raised at an instant."""
+    """Return the error message for an exception that a block raised at an instant."""
     cls = type(component)
     return BlockFailure(component.name, cls.path(), time_s, scan, error_at(error, cls))

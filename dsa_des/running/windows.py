@@ -118,7 +118,7 @@ class Windows:
         return min(self.start + length_ticks, self.end_tick)
 
     def next(self) -> Window | None:
-        """Return the window to run now, or None when the run has come to its end."""
+        """Return the window to run next, or None when the run is over."""
         if self.start >= self.end_tick:
             return None
         if self.next_instant is not None and self._all_go:
@@ -174,7 +174,7 @@ class Rewinder:
 
     def mark(self) -> None:
         """Remember how everything is now."""
-        self._states = [_copied(vars(thing)) for thing in self._things]
+        self._states = [_copy_state(vars(thing)) for thing in self._things]
         self._wires = [channel.state() for channel in self._channels]
         self._recorded = None if self._recorder is None else self._recorder.mark()
 
@@ -182,16 +182,16 @@ class Rewinder:
         """Bring everything back to how it was at `mark`."""
         for thing, state in zip(self._things, self._states, strict=True):
             vars(thing).clear()
-            vars(thing).update(_copied(state))
+            vars(thing).update(_copy_state(state))
         for channel, wire in zip(self._channels, self._wires, strict=True):
             channel.set_state(wire)
         if self._recorder is not None and self._recorded is not None:
             self._recorder.rewind(self._recorded)
         self.watch()
 
-    def came_back(self) -> int | None:
+    def first_returned_arrival(self) -> int | None:
         """Return when the first message arrives that came back since `watch` or `restore`."""
-        ticks = [channel.earliest_pushed() for channel in self._feedback]
+        ticks = [channel.first_pushed_arrival() for channel in self._feedback]
         return min((tick for tick in ticks if tick is not None), default=None)
 
 
@@ -230,7 +230,7 @@ class RewindingWindows(Windows):
 
     def commit(self, window: Window, failure: Failure | None) -> int | None:
         """Undo a window inside of which a message came back."""
-        back = self._rewinder.came_back()
+        back = self._rewinder.first_returned_arrival()
         early = window.end if back is None else back
         if failure is not None and window.ahead > window.end:
             # Perhaps it lies beyond the window: again, and nobody runs ahead.
@@ -263,7 +263,7 @@ class RewindingWindows(Windows):
         return max(1, min(self.longest_ticks // _RESTART, self._horizon))
 
 
-def _copied(state: Mapping[str, Any]) -> dict[str, Any]:
+def _copy_state(state: Mapping[str, Any]) -> dict[str, Any]:
     """Copy what a block might change in place; messages and tables are never changed so."""
     return {
         name: value.copy() if isinstance(value, _CONTAINERS) else value

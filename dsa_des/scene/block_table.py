@@ -68,7 +68,7 @@ class ProcessorParameters(Parameters):
 
     @field_validator("when_busy", mode="before")
     @classmethod
-    def _known(cls, name: Any) -> Any:
+    def _check_policy(cls, name: Any) -> Any:
         find_policy(name)
         return name
 
@@ -84,7 +84,7 @@ class Block:
     parameters: Parameters
     options: BlockOptions = BlockOptions()
 
-    def written(self) -> dict[str, Any]:
+    def to_table(self) -> dict[str, Any]:
         """Return its table with every parameter written out, as plain TOML values."""
         return {
             "type": self.type_name,

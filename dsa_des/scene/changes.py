@@ -18,11 +18,11 @@ from itertools import combinations
 from math import lcm
 from typing import Any
 
-from dsa_des.block.component import as_written
+from dsa_des.block.component import scene_number
 from dsa_des.block.registry import section_models
 from dsa_des.errors import SceneError, did_you_mean, shown_value
 from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
-from dsa_des.scene.keys import Key, dotted, flat, key_in, no_item
+from dsa_des.scene.keys import Key, dotted_key, explain_no_item, flat, key_in
 from dsa_des.scene.overrides import set_value
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.scene.wiring import MAY_CHANGE as OF_WIRES
@@ -71,11 +71,11 @@ class TimedChange:
         )
         return f"from {float(self.from_s):g} s{until}: {values}"
 
-    def written(self) -> dict[str, Any]:
+    def to_table(self) -> dict[str, Any]:
         """Return the change as an entry of ``changes``."""
-        from_s = as_written(self.from_s)
+        from_s = scene_number(self.from_s)
         when = {"at_s": from_s} if self.to_s is None else {
-            "from_s": from_s, "to_s": as_written(self.to_s)
+            "from_s": from_s, "to_s": scene_number(self.to_s)
         }  # fmt: skip
         return {**when, "set": dict(self.resolved)}
 
@@ -103,14 +103,14 @@ def read_timed_changes(
     read = [
         change
         for number, entry in enumerate(entries)
-        if (change := _read(scene_file, number, entry, blocks, wires)) is not None
+        if (change := _read_entry(scene_file, number, entry, blocks, wires)) is not None
     ]
     for one, other in combinations(read, 2):
         _refuse_overlap(scene_file, one, other)
     return read
 
 
-def _read(
+def _read_entry(
     scene_file: SceneFile,
     number: int,
     entry: Any,
@@ -144,18 +144,18 @@ def _read(
     keys = []
     for text, value in values.items():
         keys.append(key := key_in(scene_file.data, text))
-        if reason := _why_fixed(scene_file, key, blocks):
+        if reason := _explain_fixed(scene_file, key, blocks):
             scene_file.report((*at, "set", text), reason, value)
     if from_s is None or len(scene_file.problems) > before:
         return None
     resolved = {
-        _written_key(scene_file, text, key, wires): value
+        _key_of_written_scene(scene_file, text, key, wires): value
         for (text, value), key in zip(values.items(), keys, strict=True)
     }
     return TimedChange(number, from_s, to_s, values, tuple(keys), resolved)
 
 
-def _written_key(scene_file: SceneFile, text: str, key: Key, wires: Sequence[Wire]) -> str:
+def _key_of_written_scene(scene_file: SceneFile, text: str, key: Key, wires: Sequence[Wire]) -> str:
     """Return what a dotted key is called where the scene's wires are written out, in order."""
     if key[0] != "wires":
         return text
@@ -168,7 +168,7 @@ def _written_key(scene_file: SceneFile, text: str, key: Key, wires: Sequence[Wir
         sends = (wire.source, f"{wire.source}.{wire.output}")
         takes = (wire.target, f"{wire.target}.{wire.input}")
         if first in sends and last in takes:
-            return dotted(("wires", place, *key[2:]))
+            return dotted_key(("wires", place, *key[2:]))
     return text
 
 
@@ -183,7 +183,7 @@ def _seconds(scene_file: SceneFile, key: Key, value: Any) -> Fraction | None:
     return seconds
 
 
-def _why_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -> str:
+def _explain_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -> str:
     """Return why a key cannot change while a run lasts, and which could; nothing where it can."""
     first, name, *rest = (*key, "", "")
     if first == "blocks" and name in blocks:
@@ -199,7 +199,7 @@ def _why_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -> st
             )
         what, rest = f"blocks.{name}, a {cls.__name__},", rest[:-1]
     elif first == "wires" and not isinstance(name, int):
-        return no_item(scene_file.data.get("wires", []), str(name))
+        return explain_no_item(scene_file.data.get("wires", []), str(name))
     elif first == "wires":
         allowed, what, rest = OF_WIRES, f"wires[{name}]", rest[:-1]
     elif first == "processors" and name in scene_file.data.get("processors", {}):
@@ -208,7 +208,7 @@ def _why_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -> st
         allowed, what, rest = may_change(section_models()[str(first)]), f"[{first}]", [name]
     else:
         known = [*(f"blocks.{n}" for n in blocks), "wires", "processors", *section_models()]
-        hint = did_you_mean(dotted(key[:2]), known)
+        hint = did_you_mean(dotted_key(key[:2]), known)
         return f"is no key of this scene that can change while a run lasts{hint}"
     if rest and rest[0] in allowed:
         return ""
@@ -234,7 +234,7 @@ def _refuse_overlap(scene_file: SceneFile, one: TimedChange, other: TimedChange)
     if other.from_s < one.from_s:
         one, other = other, one
     for text, key in zip(other.values, other.keys, strict=True):
-        if not any(_same_place(key, mine) for mine in one.keys):
+        if not any(_is_at_or_in(key, mine) for mine in one.keys):
             continue
         inside = one.to_s is not None and other.from_s < one.to_s
         if inside or one.from_s == other.from_s:
@@ -246,7 +246,7 @@ def _refuse_overlap(scene_file: SceneFile, one: TimedChange, other: TimedChange)
             scene_file.report((CHANGES, other.number, "set", text), message)
 
 
-def _same_place(one: Key, other: Key) -> bool:
+def _is_at_or_in(one: Key, other: Key) -> bool:
     """Return whether one key is the other, or is in it."""
     shorter = min(len(one), len(other))
     return one[:shorter] == other[:shorter]
@@ -279,7 +279,7 @@ def stretches_of(
         file = scene_file.copy()
         del file.data[CHANGES]
         keys: dict[str, None] = {}
-        for change in _in_force(changes, instant):
+        for change in _changes_in_force(changes, instant):
             source = f"{scene_file.source_of((CHANGES, change.number))}: changes[{change.number}]"
             for text, value in change.values.items():
                 file.problems += set_value(file, text, value, source)
@@ -312,10 +312,10 @@ def _judge_late(
             if scene_file.source_of(at) == scene_file.source_of(("duration_s",)):
                 scene_file.report(at, message, scene_file.data[CHANGES][change.number][key])
             elif key == first:
-                notes.append(f"{dotted(at)} is {float(change.from_s):g}: it {message}")
+                notes.append(f"{dotted_key(at)} is {float(change.from_s):g}: it {message}")
 
 
-def _in_force(changes: list[TimedChange], instant: Fraction) -> Iterator[TimedChange]:
+def _changes_in_force(changes: list[TimedChange], instant: Fraction) -> Iterator[TimedChange]:
     """Yield the changes that hold at an instant: those for good in order of time, then others."""
     for change in sorted(changes, key=lambda one: (one.to_s is not None, one.from_s)):
         if change.from_s <= instant and (change.to_s is None or instant < change.to_s):

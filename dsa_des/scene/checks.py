@@ -22,13 +22,13 @@ from dsa_des.scene.block_table import (
     split_options,
 )
 from dsa_des.scene.graph import unfed_inputs
-from dsa_des.scene.keys import Key, dotted
+from dsa_des.scene.keys import Key, dotted_key
 from dsa_des.scene.overrides import drop_of_other_type
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene_file import SceneFile
-from dsa_des.scene.wiring import Wire, why_no_block_name
+from dsa_des.scene.wiring import Wire, block_name_refusal
 from dsa_des.stretches.outage import Outage
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 from dsa_des.time.clock import MAX_TICK, ClockSpec, parse_rational, resolution
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def check_times(
     longest_s = Fraction(MAX_TICK, ticks_per_s)
     if longest_s <= _A_DAY and longest_s <= 1 + (duration_s or _A_DAY):
         shown = (
-            shortened(f"{name} {spec.rate_hz} Hz + {spec.offset_s} s", 100)
+            shorten(f"{name} {spec.rate_hz} Hz + {spec.offset_s} s", 100)
             for name, spec in known.items()
         )
         message = (
@@ -266,7 +266,9 @@ def read_table(
     try:
         read = model.model_validate(table)
     except ValidationError as error:
-        scene_file.problems += explain(scene_file, key, what or f"[{dotted(key)}]", model, error)
+        scene_file.problems += explain(
+            scene_file, key, what or f"[{dotted_key(key)}]", model, error
+        )
         return None
     check_lookalikes(scene_file, key, table, read)
     return read
@@ -284,7 +286,7 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
         key: Key = ("blocks", name)
         table = tables[name]
         classes[name] = None
-        if reason := why_no_block_name(str(name)):
+        if reason := block_name_refusal(str(name)):
             scene_file.report(key, reason, str(name))
         if not isinstance(table, dict):
             scene_file.report(key, "must be a table", table)
@@ -298,7 +300,7 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
             scene_file.report((*key, "type"), message)
             continue
         try:
-            cls = find(type_name, dotted((*key, "type")), (scene_file.path.parent,))
+            cls = find(type_name, dotted_key((*key, "type")), (scene_file.path.parent,))
         except NotImported:
             continue
         except UnknownType as error:
@@ -310,11 +312,12 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
             if index[:2] == key:
                 source, gone = scene_file.source_of(index), ", ".join(lost)
                 notes.append(
-                    f"blocks.{name}: {dotted(index[2:])} of {source} takes the place of the whole "
-                    f"list, {gone} too; a table [{dotted(index)}.NAME] changes one item or adds one"
+                    f"blocks.{name}: {dotted_key(index[2:])} of {source} takes the place of the "
+                    f"whole list, {gone} too; a table [{dotted_key(index)}.NAME] changes one item "
+                    "or adds one"
                 )
         extra, given = split_options(table, cls.Parameters)
-        given = _as_written(scene_file, key, given, cls.Parameters)
+        given = _restore_sources(scene_file, key, given, cls.Parameters)
         try:
             with foreign_code(ValidationError):
                 parameters = cls.Parameters.model_validate(given)
@@ -333,7 +336,7 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
     return classes, blocks
 
 
-def _as_written(
+def _restore_sources(
     scene_file: SceneFile, key: Key, given: dict[str, Any], model: Any
 ) -> dict[str, Any]:
     """Return a block's parameters with what its tables take from the file that wrote them first."""

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dsa_des.block.entry_points import registered
-from dsa_des.block.foreign import installed
+from dsa_des.block.entry_points import entry_points_of
+from dsa_des.block.foreign import load_installed
 from dsa_des.files.input_files import InputFileError, is_regular_file, read_input_text
 from dsa_des.files.toml_files import NotToml, TomlError, parse_toml
 
@@ -39,8 +39,8 @@ def scene_of_data(path: Path) -> DataScene | None:
         return None
     except InputFileError:
         pass
-    for point in registered(GROUP).values():
-        found: DataScene | None = installed(point)(path)
+    for point in entry_points_of(GROUP).values():
+        found: DataScene | None = load_installed(point)(path)
         if found is not None:
             return found
     return None

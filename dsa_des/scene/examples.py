@@ -14,7 +14,7 @@ from dsa_des.scene.scene_file import read_scene_file
 Kind = Literal["scene", "study", "case"]
 
 
-def chosen_file(asked: Path | str, kind: Kind | None = None) -> Path:
+def find_input_file(asked: Path | str, kind: Kind | None = None) -> Path:
     """Return the file of a scene, study or case: a path that exists, or else a shipped one's.
 
     A name that is neither is returned as a path, for its reader to say what is wrong with it.

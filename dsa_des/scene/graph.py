@@ -18,7 +18,7 @@ from dsa_des.scene.wiring import Wire
 def build_graph(blocks: Sequence[str], wires: Sequence[Wire]) -> nx.DiGraph:
     """Return the graph of the blocks; an edge holds its wires as ``wires``.
 
-    An edge is ``delayed`` when all of its wires are.
+    An edge is ``is_delayed`` when all of its wires are.
     """
     graph = nx.DiGraph()
     graph.add_nodes_from(sorted(blocks))
@@ -27,11 +27,11 @@ def build_graph(blocks: Sequence[str], wires: Sequence[Wire]) -> nx.DiGraph:
             graph.add_edge(wire.source, wire.target, wires=[], delayed=True)
         edge = graph.edges[wire.source, wire.target]
         edge["wires"].append(wire)
-        edge["delayed"] = edge["delayed"] and wire.delayed
+        edge["delayed"] = edge["delayed"] and wire.is_delayed
     return graph
 
 
-def undelayed(graph: nx.DiGraph) -> nx.DiGraph:
+def undelayed_edges(graph: nx.DiGraph) -> nx.DiGraph:
     """Return the view of the graph over the edges that act within an instant."""
     return nx.subgraph_view(graph, filter_edge=lambda a, b: not graph.edges[a, b]["delayed"])
 
@@ -72,14 +72,14 @@ def unfed_inputs(name: str, cls: type[Component], wires: Iterable[Wire]) -> list
 
 
 def _check_cycles(scene: SceneFile, graph: nx.DiGraph) -> None:
-    now = undelayed(graph)
+    now = undelayed_edges(graph)
     for group in nx.strongly_connected_components(now):
         first = min(group)
         if len(group) == 1 and not now.has_edge(first, first):
             continue
         cycle = nx.find_cycle(now.subgraph(group), first)
         hops = [
-            next(str(wire) for wire in graph.edges[a, b]["wires"] if not wire.delayed)
+            next(str(wire) for wire in graph.edges[a, b]["wires"] if not wire.is_delayed)
             for a, b in cycle
         ]
         message = (
@@ -87,11 +87,11 @@ def _check_cycles(scene: SceneFile, graph: nx.DiGraph) -> None:
             '(delay_s, or delay = "1 scan")'
         )
         scene.report(("wires",), message)
-    looped = in_cycles(graph)
+    looped = cycle_numbers(graph)
     for source, target, wires in graph.edges(data="wires"):
         if source in looped and target in looped and looped[source] == looped[target]:
             for wire in wires:
-                if wire.delayed and wire.holds is None:
+                if wire.is_delayed and wire.holds is None:
                     message = (
                         f"{wire} is a feedback wire: say what it holds before the first "
                         "message (holds = 'nothing' or a table)"
@@ -125,7 +125,7 @@ def _check_reach(
                 scene.report(("blocks", name), message)
 
 
-def in_cycles(graph: nx.DiGraph) -> dict[str, int]:
+def cycle_numbers(graph: nx.DiGraph) -> dict[str, int]:
     """Return, for each block in a feedback loop, the number of its loop."""
     looped: dict[str, int] = {}
     for number, group in enumerate(nx.strongly_connected_components(graph)):
@@ -140,7 +140,7 @@ def depths(graph: nx.DiGraph, first: Collection[str] = ()) -> dict[str, int]:
 
     Whatever the blocks in `first` do not depend on is deeper than they are.
     """
-    return _depths(undelayed(graph), first)
+    return _depths(undelayed_edges(graph), first)
 
 
 def _depths(graph: nx.DiGraph, first: Collection[str]) -> dict[str, int]:

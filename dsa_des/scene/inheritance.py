@@ -10,9 +10,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.registry import sourced
+from dsa_des.block.registry import add_source
 from dsa_des.errors import Problem, did_you_mean
-from dsa_des.scene.keys import Key, dotted, is_new_item, names_of, no_item, place_of, step, unquoted
+from dsa_des.scene.keys import (
+    Key,
+    dotted_key,
+    explain_no_item,
+    is_new_item,
+    names_of,
+    place_of,
+    step,
+    unquote_key,
+)
 
 REMOVE, BLOCKS, WIRES = "remove", "blocks", "wires"
 
@@ -71,7 +80,7 @@ class Inheritance:
             elif isinstance(value, dict) and isinstance(mine, list) and names_of(mine):
                 self._merge_items(mine, value, (*at, key))
             else:
-                lost = _lost(mine, value)
+                lost = _lost_items(mine, value)
                 if lost:
                     self.replaced[(*at, key)] = lost
                 base[key] = value
@@ -84,7 +93,9 @@ class Inheritance:
         if not isinstance(base.get(WIRES), list):
             return
         kept = [
-            (old, piece) for old, entry in enumerate(base[WIRES]) for piece in _without(entry, gone)
+            (old, piece)
+            for old, entry in enumerate(base[WIRES])
+            for piece in _drop_hops(entry, gone)
         ]
         sources = {k: v for k, v in self._sources.items() if k[:1] == (WIRES,) and len(k) > 1}
         for key in sources:
@@ -106,7 +117,7 @@ class Inheritance:
             elif len(at) < 2 and (at or key == "blocks"):
                 self.note_beside(value, inherited, (*at, key))
 
-    def finished(self, tables: dict[str, Any], at: Key) -> dict[str, Any]:
+    def finish(self, tables: dict[str, Any], at: Key) -> dict[str, Any]:
         """Return the tables of a file that is read to its end, without what was to be removed."""
         if self._any_removals:
             self._strip(tables, at)
@@ -134,8 +145,8 @@ class Inheritance:
                 items.append({"name": name})
             if index is None:
                 source = self._sources.get((*at, name), "")
-                message = no_item(items, name)
-                self._problems.append(Problem(source, dotted((*at, name)), message))
+                message = explain_no_item(items, name)
+                self._problems.append(Problem(source, dotted_key((*at, name)), message))
                 continue
             self._move_sources((*at, name), (*at, index))
             if isinstance(value, dict) and isinstance(items[index], dict):
@@ -146,7 +157,7 @@ class Inheritance:
             self._report(removals, at)
 
     def _remove(self, container: Any, removal: Removal, at: Key) -> None:
-        rest = unquoted(removal.text)
+        rest = unquote_key(removal.text)
         removal.known = tuple(map(str, container)) if isinstance(container, dict) else ()
         while isinstance(container, dict | list):
             index: Any
@@ -191,11 +202,11 @@ class Inheritance:
                 message = (
                     f"nothing of this name is inherited{did_you_mean(removal.text, removal.known)}"
                 )
-                key = dotted((*at, REMOVE))
+                key = dotted_key((*at, REMOVE))
                 self._problems.append(Problem(removal.source, key, message, removal.text))
 
 
-def _without(entry: Any, gone: set[str]) -> list[Any]:
+def _drop_hops(entry: Any, gone: set[str]) -> list[Any]:
     """Return what is left of an entry of ``wires`` without the hops from and to some blocks."""
     if isinstance(entry, dict):
         ends = [str(entry.get(end)).partition(".")[0].strip() for end in ("from", "to")]
@@ -209,12 +220,12 @@ def _without(entry: Any, gone: set[str]) -> list[Any]:
         else:
             pieces[-1].append(end)
     return [entry] if len(pieces) == 1 else [
-        sourced("->".join(piece).strip(), getattr(entry, "folder", Path()))
+        add_source("->".join(piece).strip(), getattr(entry, "folder", Path()))
         for piece in pieces if len(piece) > 1
     ]  # fmt: skip
 
 
-def _lost(old: Any, new: Any) -> list[str]:
+def _lost_items(old: Any, new: Any) -> list[str]:
     """Return the named items of a list that another in its place has not."""
     if not (isinstance(old, list) and isinstance(new, list)):
         return []

@@ -13,7 +13,7 @@ INDEX = re.compile(r"[0-9]{1,9}")
 _QUOTED = re.compile(r""""([^"]*)"|(?<![^.\[])'([^']*)'(?![^.\]])""")
 
 
-def dotted(key: Key) -> str:
+def dotted_key(key: Key) -> str:
     """Return ``blocks.traffic.intruders[1].name`` for a key path."""
     text = ""
     for part in key:
@@ -21,7 +21,7 @@ def dotted(key: Key) -> str:
     return text
 
 
-def unquoted(text: str) -> str:
+def unquote_key(text: str) -> str:
     """Return a dotted key without the quotes around its parts."""
     return _QUOTED.sub(lambda match: match[1] if match[2] is None else match[2], text).replace(
         '"', ""
@@ -48,7 +48,7 @@ def step(container: Any, rest: str) -> tuple[str | int | None, str, str]:
 
     A name that is already there is found whole, dots and brackets included: a study has axes of
     names such as ``wires[4].drop_probability``. The step into a list is None where it has no such
-    item; `no_item` says what it has.
+    item; `explain_no_item` says what it has.
     """
     if isinstance(container, list):
         return _item(container, rest)
@@ -79,7 +79,7 @@ def place_of(items: list[Any], part: str) -> int | None:
     return places[0] if len(places) == 1 else None
 
 
-def no_item(items: list[Any], part: str) -> str:
+def explain_no_item(items: list[Any], part: str) -> str:
     """Say that a list has no such item, or several, and what it has."""
     names = names_of(items)
     if names.count(part) > 1:
@@ -108,7 +108,7 @@ def names_of(items: list[Any]) -> list[str]:
     return [name for item in items if (name := _name(item))]
 
 
-def in_words(tables: Any, text: str) -> str:
+def name_items(tables: Any, text: str) -> str:
     """Return a dotted key with items of lists by their names; empty where it holds no item.
 
     ``wires[4].delay_s`` is ``wire from radar to fusion:.delay_s``.
@@ -159,7 +159,7 @@ def key_in(tables: Any, text: str) -> Key:
     What the tables do not hold stays as it was written.
     """
     path: list[str | int] = []
-    rest = unquoted(text)
+    rest = unquote_key(text)
     while rest:
         index, part, rest = step(tables, rest)
         path.append(part if index is None else index)

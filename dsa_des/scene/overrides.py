@@ -12,13 +12,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.component import Component, SourcedText, as_written
+from dsa_des.block.component import Component, SourcedText, scene_number
 from dsa_des.block.entry_points import COMPONENTS
-from dsa_des.block.registry import NotImported, UnknownType, find, sourced, type_text
+from dsa_des.block.registry import NotImported, UnknownType, add_source, find, type_text
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.files.toml_files import DEEPEST, NotToml, TomlError, parse_toml
 from dsa_des.scene.block_table import BlockOptions
-from dsa_des.scene.keys import Key, dotted, is_new_item, no_item, step, unquoted
+from dsa_des.scene.keys import Key, dotted_key, explain_no_item, is_new_item, step, unquote_key
 from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_tables
 
 #: A dotted key and its value, or ``swap.BLOCK`` and a type.
@@ -42,9 +42,9 @@ def parse_value(text: str) -> Any:
     try:
         value = parse_toml(f"value = {text}")
     except NotToml:
-        return _sourced(text)
+        return _add_sources(text)
     # What follows a line's end would be further keys.
-    return _sourced(value["value"] if set(value) == {"value"} else text)
+    return _add_sources(value["value"] if set(value) == {"value"} else text)
 
 
 def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[Problem]]:
@@ -79,7 +79,7 @@ def read_changes(
         if isinstance(parsed, Problem):
             problems.append(parsed)
         else:
-            changes.append((SWAP + parsed[0], sourced(parsed[1], Path.cwd())))
+            changes.append((SWAP + parsed[0], add_source(parsed[1], Path.cwd())))
     values, wrong = read_sets(sets)
     for key, value in values:
         if key.startswith(SWAP):
@@ -154,19 +154,19 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     ``blocks.traffic.intruders.head_on.east_m``.
     """
     try:
-        value = _extended(value, source)
+        value = _extend_table(value, source)
     except SceneError as error:
         return [replace(one, key=f"{text}.{one.key}") for one in error.problems]
     container: Any = scene.data
     key: list[str | int] = []
-    rest = unquoted(text)
+    rest = unquote_key(text)
     while True:
         index, part, rest = step(container, rest)
         if index is None and not rest and is_new_item(container, part, value):
             index, value = len(container), {"name": part, **value}
             container.append(value)
         if index is None:
-            return [Problem(source, text, no_item(container, part))]
+            return [Problem(source, text, explain_no_item(container, part))]
         if key == ["blocks"] and index not in container:
             hint = did_you_mean(str(index), container)
             return [Problem(source, text, f"the scene has no block {part!r}{hint}")]
@@ -183,7 +183,7 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
         elif key[0] == "wires" and len(key) == 2 and (table := _wire_table(container[index])):
             container[index] = table
         elif not isinstance(container[index], dict | list):
-            return [Problem(source, text, f"{dotted(tuple(key))} is no table")]
+            return [Problem(source, text, f"{dotted_key(tuple(key))} is no table")]
         container = container[index]
     for source_key in [known for known in scene.sources if known[: len(key)] == tuple(key)]:
         del scene.sources[source_key]
@@ -192,15 +192,15 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     return []
 
 
-def _extended(value: Any, source: str) -> Any:
+def _extend_table(value: Any, source: str) -> Any:
     """Return a table with all that it extends, as a file's would be; all else as it is."""
     if isinstance(value, list):
-        return [_extended(item, source) for item in value]
+        return [_extend_table(item, source) for item in value]
     if not isinstance(value, dict):
         return value
     if "extends" in value:
         return read_scene_tables(value, source).data
-    return {key: _extended(item, source) for key, item in value.items()}
+    return {key: _extend_table(item, source) for key, item in value.items()}
 
 
 def swap_type(
@@ -208,7 +208,7 @@ def swap_type(
 ) -> list[str]:
     """Put another type into a block; return the keys that it had and the type lacks."""
     if not isinstance(type_name, SourcedText):
-        type_name = sourced(type_name, Path.cwd())
+        type_name = add_source(type_name, Path.cwd())
     blocks = scene.data.get("blocks", {})
     if not isinstance(blocks, dict) or not isinstance(blocks.get(name), dict):
         hint = did_you_mean(name, blocks if isinstance(blocks, dict) else ())
@@ -216,7 +216,7 @@ def swap_type(
         scene.problems.append(Problem(source, option or name, message, name))
         return []
     try:
-        cls = find(type_name, dotted(_type_key(name)), (scene.path.parent,))
+        cls = find(type_name, dotted_key(_type_key(name)), (scene.path.parent,))
     except NotImported:  # what it would drop is not known: nothing is dropped
         blocks[name]["type"] = type_name
         scene.sources[_type_key(name)] = source
@@ -247,12 +247,13 @@ def drop_of_other_type(scene: SceneFile, name: str, cls: type[Component]) -> lis
         if mine and parameter not in _known_keys(cls):
             del block[parameter]
             notes.append(
-                f"{dotted(key)} of {scene.source_of(key)} was dropped: it is a parameter of "
+                f"{dotted_key(key)} of {scene.source_of(key)} was dropped: it is a parameter of "
                 f"{old}, and {scene.source_of(_type_key(name))} makes {name} a {block['type']}"
             )
         elif mine and (meanings := _other_meaning(scene, old, cls, str(parameter))):
             notes.append(
-                f"{dotted(key)} of {scene.source_of(key)} is kept, though it means another thing: "
+                f"{dotted_key(key)} of {scene.source_of(key)} is kept, though it means "
+                "another thing: "
                 f"{meanings[0]!r} of {old}, {meanings[1]!r} of {block['type']}, which "
                 f"{scene.source_of(_type_key(name))} makes {name}"
             )
@@ -301,11 +302,11 @@ def scene_value(value: Any, group: str = COMPONENTS) -> Any:
     if isinstance(value, type):
         return type_text(value, group)
     if isinstance(value, Path):
-        return sourced(str(value), Path.cwd())
+        return add_source(str(value), Path.cwd())
     if isinstance(value, str):
-        return value if hasattr(value, "folder") else sourced(value, Path.cwd())
+        return value if hasattr(value, "folder") else add_source(value, Path.cwd())
     if isinstance(value, Fraction):
-        return as_written(value)
+        return scene_number(value)
     if isinstance(value, Mapping):
         for key in value:
             if not isinstance(key, str):
@@ -321,11 +322,11 @@ def scene_value(value: Any, group: str = COMPONENTS) -> Any:
     )
 
 
-def _sourced(value: Any) -> Any:
+def _add_sources(value: Any) -> Any:
     if isinstance(value, str):
-        return sourced(value, Path.cwd())
+        return add_source(value, Path.cwd())
     if isinstance(value, list):
-        return [_sourced(item) for item in value]
+        return [_add_sources(item) for item in value]
     if isinstance(value, dict):
-        return {key: _sourced(item) for key, item in value.items()}
+        return {key: _add_sources(item) for key, item in value.items()}
     return value

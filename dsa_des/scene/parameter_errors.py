@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import SchemaValidator
 
-from dsa_des.block.component import Parameters, as_written
+from dsa_des.block.component import Parameters, scene_number
 from dsa_des.errors import Disagreements, Lines, Problem, did_you_mean, nearest
 from dsa_des.scene.keys import Key, key_in
 from dsa_des.scene.scene_file import SceneFile
@@ -21,12 +21,12 @@ def all_disagreements(model: type[BaseModel], item: Any) -> list[str]:
     """Return what every validator of a whole model says of a table that one of them refused."""
     texts = _texts(item.get("ctx", {}).get("error")) or [item["msg"]]
     try:
-        table = SchemaValidator(_of_fields(model.__pydantic_core_schema__)).validate_python(
+        table = SchemaValidator(_fields_schema(model.__pydantic_core_schema__)).validate_python(
             item["input"]
         )
     except Exception:  # a foreign model may raise anything; the errors so far stand
         return texts
-    return list(dict.fromkeys(texts + _asked(model, table)))
+    return list(dict.fromkeys(texts + _validator_messages(model, table)))
 
 
 def disagreements_besides(
@@ -39,7 +39,7 @@ def disagreements_besides(
     known = set(model.model_fields)
     refused = refused & known
     try:
-        schema = _without(_of_fields(model.__pydantic_core_schema__), refused)
+        schema = _relax_fields(_fields_schema(model.__pydantic_core_schema__), refused)
         table = SchemaValidator(schema).validate_python(
             {key: given[key] for key in known & set(given)} | dict.fromkeys(refused)
         )
@@ -47,10 +47,10 @@ def disagreements_besides(
             table.__dict__.pop(name, None)
     except Exception:  # a foreign model may raise anything; the errors so far stand
         return []
-    return _asked(model, table)
+    return _validator_messages(model, table)
 
 
-def _asked(model: type[BaseModel], table: Any) -> list[str]:
+def _validator_messages(model: type[BaseModel], table: Any) -> list[str]:
     """Return what the validators of a whole model say of it."""
     texts: list[str] = []
     names = set(model.model_fields)
@@ -72,21 +72,21 @@ def _texts(error: Any) -> list[str]:
     return [] if error is None else [str(error)]
 
 
-def _of_fields(schema: Any) -> Any:
+def _fields_schema(schema: Any) -> Any:
     """Return a model's schema without what is asked of it as a whole after its fields."""
     if schema["type"] == "function-after":
-        return _of_fields(schema["schema"])
+        return _fields_schema(schema["schema"])
     if schema["type"] == "definitions":
-        return {**schema, "schema": _of_fields(schema["schema"])}
+        return {**schema, "schema": _fields_schema(schema["schema"])}
     return schema
 
 
-def _without(schema: Any, refused: set[str]) -> Any:
+def _relax_fields(schema: Any, refused: set[str]) -> Any:
     """Return a model's schema in which some fields may be anything."""
     if schema["type"] == "model-fields":
         anything = {"type": "model-field", "schema": {"type": "any"}}
         return {**schema, "fields": schema["fields"] | dict.fromkeys(refused, anything)}
-    return {**schema, "schema": _without(schema["schema"], refused)}
+    return {**schema, "schema": _relax_fields(schema["schema"], refused)}
 
 
 _MUST = "must be "
@@ -112,10 +112,10 @@ def explain(
             kind = "parameter" if key else "key"
             problems.append(scene_file.problem(at, f"unknown {kind} of {what}{hint}"))
         elif length := _list_length(model, item):
-            given = _at(scene_file, at)
+            given = _value_at(scene_file, at)
             problems.append(scene_file.problem(at, f"must be a list of {length} numbers", given))
         elif item["type"] == "too_short":
-            least, given = item["ctx"]["min_length"], _at(scene_file, at)
+            least, given = item["ctx"]["min_length"], _value_at(scene_file, at)
             if not isinstance(given, list) or len(given) < least:  # else its items were refused
                 problems.append(scene_file.problem(at, f"must be at least {least} values", given))
         elif item["type"].startswith("union_tag"):
@@ -127,9 +127,9 @@ def explain(
             problems.append(scene_file.problem(at, f"is required by {what} and missing{hint}"))
         elif not item["loc"] and item["type"] == "value_error":
             texts = all_disagreements(model, item)
-            problems += [_refused(scene_file, at, text, item["input"]) for text in texts]
+            problems += [_refusal_problem(scene_file, at, text, item["input"]) for text in texts]
         elif isinstance(text := str(item.get("ctx", {}).get("error")), Lines):
-            problems.append(_refused(scene_file, at, text, item["input"]))
+            problems.append(_refusal_problem(scene_file, at, text, item["input"]))
         else:
             message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
             message = message.replace("Input should be", "must be", 1)
@@ -146,12 +146,12 @@ def explain(
                 names = re.findall(r"'([^']*)'", item["ctx"]["expected"])
                 close = nearest(str(item["input"]), names)
                 message += f"; did you mean {close!r}?" if close else ""
-            problems.append(_refused(scene_file, at, message, item["input"]))
-    given = _at(scene_file, key)
+            problems.append(_refusal_problem(scene_file, at, message, item["input"]))
+    given = _value_at(scene_file, key)
     if refused and isinstance(given, Mapping):
         for text in disagreements_besides(model, given, refused):
-            problems.append(_refused(scene_file, key, text, given))
-    return _one_by_key(problems)
+            problems.append(_refusal_problem(scene_file, key, text, given))
+    return _merge_by_key(problems)
 
 
 def _names_meant(model: Any, item: Any) -> list[str]:
@@ -165,7 +165,7 @@ def _names_meant(model: Any, item: Any) -> list[str]:
     return [name, close] if close else [name]
 
 
-def _one_by_key(problems: list[Problem]) -> list[Problem]:
+def _merge_by_key(problems: list[Problem]) -> list[Problem]:
     """Return problems with one for each key: "must be true or false" "or 'auto'"."""
     by_key: dict[tuple[str, str], Problem] = {}
     rest = []
@@ -182,13 +182,13 @@ def _one_by_key(problems: list[Problem]) -> list[Problem]:
     return rest
 
 
-def _refused(scene_file: SceneFile, at: Key, message: str, value: Any) -> Problem:
+def _refusal_problem(scene_file: SceneFile, at: Key, message: str, value: Any) -> Problem:
     """Return a validator's problem; that of a whole table is put at the key that it names."""
     if not isinstance(value, Mapping):
-        return scene_file.problem(at, message, _shown(value))
+        return scene_file.problem(at, message, _show_value(value))
     about = re.fullmatch(r"(\w+) is (\S+): (.*)", message, re.DOTALL)
     if about and about[1] in value:
-        return scene_file.problem((*at, about[1]), about[3], _shown(value[about[1]]))
+        return scene_file.problem((*at, about[1]), about[3], _show_value(value[about[1]]))
     return scene_file.problem(at, message)
 
 
@@ -224,22 +224,22 @@ def _list_length(model: Any, item: Any) -> int:
     return 0
 
 
-def _at(scene_file: SceneFile, key: Key) -> Any:
+def _value_at(scene_file: SceneFile, key: Key) -> Any:
     value: Any = scene_file.data
     for part in key:
         value = value[part]
-    return _shown(value)
+    return _show_value(value)
 
 
-def _shown(value: Any) -> Any:
+def _show_value(value: Any) -> Any:
     if isinstance(value, Fraction):
-        return as_written(value)
+        return scene_number(value)
     return str(value) if isinstance(value, str) else value
 
 
 def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) -> Key:
     """Return `key` + `loc` without the tags that pydantic puts into paths through unions."""
-    value = _at(scene_file, key)
+    value = _value_at(scene_file, key)
     path: list[str | int] = list(key)
     for position, part in enumerate(loc):
         exists = (isinstance(value, Mapping) and part in value) or (

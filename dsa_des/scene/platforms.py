@@ -22,7 +22,7 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
     for name, block in scene.blocks.items():
         said, feeding = block.options.platform, near[name] + far[name]
         if said is not None and (said not in known or name in moved):
-            problems.append(_no_platform(scene, name, known if name not in moved else None))
+            problems.append(_explain_no_platform(scene, name, known if name not in moved else None))
         elif said is not None:
             carrying[name] = said
         elif name not in moved and feeding and all(source in moved for source in feeding):
@@ -85,7 +85,7 @@ def _carried(sources: Sequence[str], carrying: Mapping[str, str]) -> dict[str, s
     return found
 
 
-def _no_platform(scene: Scene, name: str, known: Sequence[str] | None) -> Problem:
+def _explain_no_platform(scene: Scene, name: str, known: Sequence[str] | None) -> Problem:
     """Return why what a block's table names cannot carry it; `known` is None of who moves all."""
     said = scene.blocks[name].options.platform or ""
     if known is None:
@@ -94,4 +94,4 @@ def _no_platform(scene: Scene, name: str, known: Sequence[str] | None) -> Proble
         why = f"there is no such aircraft or place{did_you_mean(said, known)}"
     else:
         why = "no block of this scene says which aircraft there are"
-    return scene.refused(name, f"platform: {why}")
+    return scene.setup_refusal(name, f"platform: {why}")

@@ -10,8 +10,8 @@ from typing import Any
 
 import networkx as nx
 
-from dsa_des.block.component import Component, Context, Parameters, as_written
-from dsa_des.block.foreign_calls import REFUSALS, must_pass, why_refused
+from dsa_des.block.component import Component, Context, Parameters, scene_number
+from dsa_des.block.foreign_calls import REFUSALS, describe_error, is_stop_request
 from dsa_des.block.registry import section_models
 from dsa_des.errors import Problem, SceneError, UsageError, did_you_mean
 from dsa_des.scene.block_table import Block, ProcessorParameters
@@ -37,7 +37,7 @@ from dsa_des.scene.checks import (
     read_text,
 )
 from dsa_des.scene.graph import build_graph, check_graph
-from dsa_des.scene.keys import dotted
+from dsa_des.scene.keys import dotted_key
 from dsa_des.scene.overrides import (
     IN_SET,
     IN_SWAP,
@@ -51,7 +51,7 @@ from dsa_des.scene.parameter_errors import refusal
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.scene.wiring import Wire, read_wires, with_latencies
 from dsa_des.stretches.outage import Outage
-from dsa_des.text.safe_text import printable, shortened
+from dsa_des.text.safe_text import printable, shorten
 from dsa_des.time.randomness import Streams
 
 _TOP_LEVEL = (
@@ -123,7 +123,7 @@ class Scene:
     )
 
     def __repr__(self) -> str:
-        return described(self)
+        return describe_scene(self)
 
     def _repr_html_(self) -> str:
         rows = "".join(
@@ -170,7 +170,7 @@ class Scene:
             if problems:
                 raise SceneError(replace(one, source=IN_SET) for one in problems)
             values = dict(read)
-        return self._changed(values, IN_SET)
+        return self._change(values, IN_SET)
 
     def swap(
         self,
@@ -193,9 +193,9 @@ class Scene:
         SceneError
             With every problem that the new scene has.
         """
-        return self._changed({**(types or {}), **more}, IN_SWAP)
+        return self._change({**(types or {}), **more}, IN_SWAP)
 
-    def _changed(self, values: Mapping[str, Any], source: str) -> "Scene":
+    def _change(self, values: Mapping[str, Any], source: str) -> "Scene":
         changes = read_program(values, source)
         file, before = self.origin
         return changed_tables(file, (*before, *changes))
@@ -215,10 +215,10 @@ class Scene:
         """Return what is wrong with a dotted key of this scene."""
         return Problem(str(self.path), key, message)
 
-    def refused(self, name: str, text: str) -> Problem:
+    def setup_refusal(self, name: str, text: str) -> Problem:
         """Return what a block refuses at its start, at the key that its text begins with."""
         if self._tables is None:
-            return self.problem(dotted(("blocks", name)), text)
+            return self.problem(dotted_key(("blocks", name)), text)
         return refusal(self._tables, name, self.blocks[name].parameters, text)
 
     @property
@@ -236,15 +236,15 @@ class Scene:
         if self.description:
             tables["description"] = self.description
         if self.duration_s is not None:
-            tables["duration_s"] = as_written(self.duration_s)
+            tables["duration_s"] = scene_number(self.duration_s)
         tables["seed"] = self.seed
-        tables["wires"] = [wire.written() for wire in self.wires]
+        tables["wires"] = [wire.to_entry() for wire in self.wires]
         for name, section in self.sections.items():
             values = section.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
             if values:
                 tables[name] = values
         if self.changes:
-            tables[CHANGES] = [change.written() for change in self.changes]
+            tables[CHANGES] = [change.to_table() for change in self.changes]
         if self.outages:
             written = (one.model_dump(mode="json", exclude_none=True) for one in self.outages)
             tables["outages"] = list(written)
@@ -253,7 +253,7 @@ class Scene:
                 name: parameters.model_dump(mode="json")
                 for name, parameters in self.processors.items()
             }
-        tables["blocks"] = {name: block.written() for name, block in self.blocks.items()}
+        tables["blocks"] = {name: block.to_table() for name, block in self.blocks.items()}
         return tables
 
 
@@ -354,12 +354,12 @@ def check_scene(scene_file: SceneFile) -> Scene:
         scene.stretches = stretches_of(scene_file, scene, scene.changes, check_scene)
         scene.ticks_per_s = ticks_of_all(scene_file, scene)
     if scene_file.problems and len(sections) == len(section_models()):
-        scene_file.problems += _refused_by_themselves(scene)
+        scene_file.problems += _refusals_of_blocks(scene)
     scene_file.refuse()
     return scene
 
 
-def _refused_by_themselves(scene: Scene) -> list[Problem]:
+def _refusals_of_blocks(scene: Scene) -> list[Problem]:
     """Return what blocks would refuse next, once what is wrong elsewhere is right.
 
     Each is made alone: a file that is not there, or two intruders of one name, show by that.
@@ -370,25 +370,25 @@ def _refused_by_themselves(scene: Scene) -> list[Problem]:
         try:
             block.cls(name, block.parameters, context)
         except REFUSALS as error:
-            problems.append(scene.refused(name, why_refused(error)))
+            problems.append(scene.setup_refusal(name, describe_error(error)))
         except BaseException as error:
-            if must_pass(error):
+            if is_stop_request(error):
                 raise
     return problems
 
 
-def described(scene: Scene) -> str:
+def describe_scene(scene: Scene) -> str:
     """Return a scene in at most ten lines."""
     length = "as long as its sources" if scene.duration_s is None else f"{scene.duration_s} s"
     types = ", ".join(f"{name} = {block.type_name}" for name, block in scene.blocks.items())
     blocks = wrap(printable(types), _WIDTH, break_long_words=True)
     lines = [
-        f"Scene {shortened(repr(scene.title))} ({shortened(str(scene.path))})",
+        f"Scene {shorten(repr(scene.title))} ({shorten(str(scene.path))})",
         f"  {length}, seed {scene.seed}, {len(scene.blocks)} blocks:",
         *(f"    {line}" for line in blocks[:_MOST_LINES]),
     ]
     if len(blocks) > _MOST_LINES:
         lines.append("    ...")
     if scene.dropped:
-        lines.append(f"  dropped by swaps: {shortened(', '.join(scene.dropped), _WIDTH)}")
+        lines.append(f"  dropped by swaps: {shorten(', '.join(scene.dropped), _WIDTH)}")
     return "\n".join(lines)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.registry import sourced
+from dsa_des.block.registry import add_source
 from dsa_des.block.shipped_files import files_named, shipped_files
 from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.files.input_files import (
@@ -26,8 +26,8 @@ from dsa_des.files.input_files import (
 )
 from dsa_des.files.toml_files import DEEPEST, TomlError, parse_toml
 from dsa_des.scene.inheritance import REMOVE, Inheritance
-from dsa_des.scene.keys import Key, dotted
-from dsa_des.text.safe_text import shortened
+from dsa_des.scene.keys import Key, dotted_key
+from dsa_des.text.safe_text import shorten
 
 COMMAND_LINE = "command line"
 # Files that extend each other in a row; scenes have about four.
@@ -73,7 +73,7 @@ class SceneFile:
 
     def problem(self, key: Key, message: str, *value: Any) -> Problem:
         """Return a `Problem` at `key`, naming the file that holds it."""
-        return Problem(self.source_of(key), dotted(key), message, *value)
+        return Problem(self.source_of(key), dotted_key(key), message, *value)
 
     def report(self, key: Key, message: str, *value: Any) -> None:
         """Add a problem at `key`."""
@@ -129,11 +129,11 @@ class _Reader:
         real, tables = self._read[path]
         if isinstance(tables, dict) and real not in chain and len(chain) < _LONGEST_CHAIN:
             self.sources[at] = str(path)
-            return self._finished(tables, self._table(tables, path, at, (*chain, real)), at)
+            return self._finish(tables, self._table(tables, path, at, (*chain, real)), at)
         if isinstance(tables, TomlError):
             self.problems.append(Problem(str(path), "", str(tables)))
             return {}
-        name = shortened(str(path), 300)
+        name = shorten(str(path), 300)
         if real in chain:
             message = f"extends itself by way of {name}"
         elif isinstance(tables, dict):
@@ -147,18 +147,18 @@ class _Reader:
         else:
             message = f"{name} {tables}"
         if at or chain:
-            source, key = self.sources.get(at, str(chain[-1])), dotted((*at, "extends"))
+            source, key = self.sources.get(at, str(chain[-1])), dotted_key((*at, "extends"))
             self.problems.append(Problem(source, key, message))
         else:
             self.problems.append(Problem(str(path), "", message))
         return {}
 
     def table(self, tables: Mapping[str, Any], path: Path) -> dict[str, Any]:
-        return self._finished(tables, self._table(tables, path, (), (path,)), ())
+        return self._finish(tables, self._table(tables, path, (), (path,)), ())
 
-    def _finished(self, own: Mapping[str, Any], merged: dict[str, Any], at: Key) -> dict[str, Any]:
+    def _finish(self, own: Mapping[str, Any], merged: dict[str, Any], at: Key) -> dict[str, Any]:
         self._inheritance.note_beside(own, merged, at)
-        return self._inheritance.finished(merged, at)
+        return self._inheritance.finish(merged, at)
 
     def _count(self, path: Path, values: int = 1) -> None:
         self._taken += values
@@ -171,19 +171,21 @@ class _Reader:
     ) -> dict[str, Any]:
         if len(at) > DEEPEST:
             message = f"tables are nested too deeply: at most {DEEPEST} inside each other"
-            self.problems.append(Problem(str(path), dotted(at), message))
+            self.problems.append(Problem(str(path), dotted_key(at), message))
             return {}
         merged: dict[str, Any] = {}
         bases = table.get("extends", [])
         for base in bases if isinstance(bases, list) else [bases]:
             if not isinstance(base, str):
                 self.problems.append(
-                    Problem(str(path), dotted((*at, "extends")), "must be a file name", base)
+                    Problem(str(path), dotted_key((*at, "extends")), "must be a file name", base)
                 )
                 continue
             self.sources.setdefault(at, str(path))
             base_source = self.sources[at]
-            self._inheritance.merge(merged, self.file(self._extended(path, base), at, chain), at)
+            self._inheritance.merge(
+                merged, self.file(self._extended_path(path, base), at, chain), at
+            )
             self.sources[at] = base_source
         own = {
             key: self._value(value, path, (*at, key), chain)
@@ -194,7 +196,7 @@ class _Reader:
             own[REMOVE] = self._inheritance.removals(own[REMOVE], str(path))
         return self._inheritance.merge(merged, own, at)
 
-    def _extended(self, path: Path, base: str) -> Path:
+    def _extended_path(self, path: Path, base: str) -> Path:
         """Return the file that one extends: beside it, or else the shipped one of that name."""
         beside = path.parent / base
         if "\0" in base or os.path.lexists(beside):
@@ -214,7 +216,7 @@ class _Reader:
         if isinstance(value, list):
             return [self._value(item, path, (*at, i), chain) for i, item in enumerate(value)]
         if isinstance(value, str):
-            return sourced(value, path.parent)
+            return add_source(value, path.parent)
         return value
 
 
@@ -240,7 +242,7 @@ def _similar_file(path: Path, shipped: bool) -> str:
     try:
         names = [entry.name for entry in path.parent.iterdir() if is_regular_file(entry)]
     except OSError:
-        missing = f" (there is no folder {shortened(str(path.parent), 300)})"
+        missing = f" (there is no folder {shorten(str(path.parent), 300)})"
     if close := nearest(path.name, names):
         return f"; did you mean {path.parent / close}?"
     known = [name for index, _ in shipped_files() for name in (index.name, str(index))]
@@ -253,7 +255,7 @@ __all__ = [
     "COMMAND_LINE",
     "Key",
     "SceneFile",
-    "dotted",
+    "dotted_key",
     "merge",
     "read_scene_file",
 ]

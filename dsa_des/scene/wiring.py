@@ -17,7 +17,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-from dsa_des.block.component import Component, as_written
+from dsa_des.block.component import Component, scene_number
 from dsa_des.errors import Problem, did_you_mean, nearest
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.keys import Key
@@ -58,7 +58,7 @@ class Wire:
     queued: bool = False
 
     @property
-    def delayed(self) -> bool:
+    def is_delayed(self) -> bool:
         """Whether messages surely arrive later than they were made."""
         return self.total_delay_s > 0 or self.delay_scans > 0 or self.queued
 
@@ -71,7 +71,7 @@ class Wire:
     def __str__(self) -> str:
         return f"{self.source}.{self.output} -> {self.target}.{self.input}"
 
-    def written(self) -> dict[str, Any] | str:
+    def to_entry(self) -> dict[str, Any] | str:
         """Return the wire as an entry of ``wires``."""
         plain = Wire(self.source, self.output, self.target, self.input)
         if plain == replace(self, latency_s=plain.latency_s, queued=plain.queued):
@@ -83,9 +83,9 @@ class Wire:
         if self.delay_scans:
             table["delay"] = f"{self.delay_scans} scan{'s' if self.delay_scans > 1 else ''}"
         elif self.delay_s:
-            table["delay_s"] = as_written(self.delay_s)
+            table["delay_s"] = scene_number(self.delay_s)
         if self.jitter_s:
-            table["jitter_s"] = as_written(self.jitter_s)
+            table["jitter_s"] = scene_number(self.jitter_s)
         if self.drop_probability:
             table["drop_probability"] = self.drop_probability
         if self.holds is not None:
@@ -136,7 +136,7 @@ def read_wires(
     return sorted(wires, key=lambda w: (w.target, w.input, w.source, w.output))
 
 
-def why_no_block_name(name: str) -> str | None:
+def block_name_refusal(name: str) -> str | None:
     """Return why no wire can name a block of this name, if so."""
     if re.fullmatch(_NAME, name):
         return None

@@ -30,12 +30,12 @@ class Outages:
     ) -> None:
         self._runs, self._ticks_per_s = runs, ticks_per_s
         self._failing = failing
-        self._edges = [self._drawn(one, streams) for one in failing]
+        self._edges = [self._draw_outages(one, streams) for one in failing]
         self._freezes = any(one.mode == "frozen" for one in failing)
         #: The last good row of each run, by output.
         self._last: dict[str, Message] = {}
 
-    def _drawn(self, one: Outage, streams: Streams) -> RunTicks:
+    def _draw_outages(self, one: Outage, streams: Streams) -> RunTicks:
         """Return when it fails and is back, in turns, of the first run, the second, and so on."""
         stream = streams.stream("[outages]", one.key)
         count, lasts_s = self._runs.count, self._runs.run_ticks / self._ticks_per_s
@@ -59,7 +59,7 @@ class Outages:
         width = ticks.shape[1]
         return RunTicks(np.repeat(np.arange(count), width), ticks.reshape(-1))
 
-    def up(self, instants: RunTicks) -> BoolArray:
+    def is_up(self, instants: RunTicks) -> BoolArray:
         """Return at which instants the block runs."""
         return ~self._failed("silent", instants)
 
@@ -97,12 +97,12 @@ class Outages:
         later = both.tick[known:] - both.tick[source[known:]]
         return message.frozen(both, source[known:], later / self._ticks_per_s)
 
-    def heard(self, wake: Wake) -> Wake:
+    def drop_unheard(self, wake: Wake) -> Wake:
         """Return a wake without what arrived while the block was out."""
         arrived: dict[str, list[Arrivals]] = {}
         for port, every in wake._arrived.items():
             for new in every:
-                rows = np.flatnonzero(self.up(new.instants))
+                rows = np.flatnonzero(self.is_up(new.instants))
                 if len(rows):
                     part = Arrivals(new.source, new.instants.take(rows), new.message.take(rows))
                     arrived.setdefault(port, []).append(part)
@@ -111,7 +111,7 @@ class Outages:
     def spans(self, run: int) -> IntArray:
         """Return when the block is out in a run, in order: first tick, and the first after it."""
         spans = np.concatenate([e.tick.reshape(self._runs.count, -1)[run] for e in self._edges])
-        return merged(spans.reshape(-1, 2), int(self._runs.ends[run]))
+        return merge_spans(spans.reshape(-1, 2), int(self._runs.ends[run]))
 
     def undone(self) -> Mapping[str, IntArray]:
         """Return of how many seconds of each run the block was out, as counts (2, runs)."""
@@ -131,7 +131,7 @@ def _out(edges: RunTicks, instants: RunTicks) -> BoolArray:
     return out
 
 
-def merged(spans: IntArray, end: int) -> IntArray:
+def merge_spans(spans: IntArray, end: int) -> IntArray:
     """Return spans of ticks (spans, 2) before an end, in order, those that touch as one."""
     first, last = np.minimum(spans[np.argsort(spans[:, 0], kind="stable")], end).T
     reached = np.maximum.accumulate(last)

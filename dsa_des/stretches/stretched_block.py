@@ -50,12 +50,18 @@ class StretchedBlock:
             return
         for place, stretch in enumerate(stretches.tolist()):
             arrived = {
-                port: [part for new in every if (part := self._of(new, stretches, place))]
+                port: [
+                    part
+                    for new in every
+                    if (part := self._arrivals_of_stretch(new, stretches, place))
+                ]
                 for port, every in wake._arrived.items()
             }
             yield self._go_to(stretch), wake.part(np.flatnonzero(of == stretch), arrived)
 
-    def _of(self, new: Arrivals, stretches: IntArray, place: int) -> Arrivals | None:
+    def _arrivals_of_stretch(
+        self, new: Arrivals, stretches: IntArray, place: int
+    ) -> Arrivals | None:
         """Return what of some arrivals comes with the rows of one of the stretches."""
         with_rows = np.searchsorted(stretches, self._stretch_of(new.tick))
         rows = np.flatnonzero(np.minimum(with_rows, len(stretches) - 1) == place)

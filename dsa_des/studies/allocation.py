@@ -90,24 +90,24 @@ class Allocation:
 
     def probabilities(self, runs: ForeseenRuns) -> FloatArray:
         """Return the probability with which each run is flown, (runs,)."""
-        left = left_open(self._chances(runs), self.predicted)
-        worth = np.sqrt(_combined(self.precision, left))
-        return flown_with(runs.weight * worth, self.size, self.least)
+        left = remaining_variance(self._chances(runs), self.predicted)
+        worth = np.sqrt(_sum_terms(self.precision, left))
+        return flight_probabilities(runs.weight * worth, self.size, self.least)
 
     def predictions(self, runs: ForeseenRuns) -> FloatArray:
         """Return with what each event counts before a run is flown, (events, runs)."""
         return np.where(self.predicted[:, np.newaxis], self._chances(runs), 0.0)
 
     def _chances(self, runs: ForeseenRuns) -> FloatArray:
-        terms = model_terms(self._scaled(runs.geometry), runs.nominal)
+        terms = model_terms(self._scale_geometry(runs.geometry), runs.nominal)
         return chances(terms, runs, self.coefficients)
 
-    def _scaled(self, geometry: FloatArray) -> FloatArray:
+    def _scale_geometry(self, geometry: FloatArray) -> FloatArray:
         away = geometry - self.middle[:, None]
         return np.where(np.isfinite(away), away, 0.0) / self.spread[:, None]
 
 
-def flown_with(worth: FloatArray, size: float, least: float) -> FloatArray:
+def flight_probabilities(worth: FloatArray, size: float, least: float) -> FloatArray:
     """Return probabilities in proportion to what runs are worth, from the least to 1."""
     if not np.isfinite(size):
         return np.ones(len(worth))
@@ -115,7 +115,7 @@ def flown_with(worth: FloatArray, size: float, least: float) -> FloatArray:
     return result
 
 
-def left_open(chance: FloatArray, predicted: BoolArray) -> FloatArray:
+def remaining_variance(chance: FloatArray, predicted: BoolArray) -> FloatArray:
     """Return what of the variance of events, (events, runs), hangs on how often they are flown."""
     sure = np.clip(chance, None, _SUREST)
     return np.where(predicted[:, np.newaxis], sure * (1.0 - sure), chance)
@@ -133,7 +133,7 @@ def chances(terms: FloatArray, runs: ForeseenRuns, coefficients: FloatArray) -> 
     without, having = (
         np.array(
             [
-                _combined(c[k], _design(terms, of))
+                _sum_terms(c[k], _design(terms, of))
                 for c, of in zip(coefficients, offset, strict=True)
             ]
         )
@@ -187,19 +187,19 @@ def best_size(
     below = (w * n).sum(axis=1)
     there = below > 0.0
     ratio = np.where(there, (w * chance).sum(axis=1) / np.where(there, below, 1.0), 0.0)[:, None]
-    left = left_open(chance, predicted)
+    left = remaining_variance(chance, predicted)
     fixed = (w**2 * (chance - left + ratio**2 * n - 2.0 * ratio * chance * n)).sum(axis=1)
     all_flown = (w**2 * left).sum(axis=1) + fixed
     counts = there & (all_flown > 0.0)
     precision = np.where(counts, 1.0 / np.where(counts, all_flown, 1.0), 0.0)
     if not counts.any():
         return precision, np.inf
-    open_ = _combined(precision, left)
+    open_ = _sum_terms(precision, left)
     worth = w * np.sqrt(open_)
     scale = 1.0 / max(float(worth.max()), 1e-300)
     costs = []
     for size in _SIZES * scale:
-        pi = flown_with(worth, size, least)
+        pi = flight_probabilities(worth, size, least)
         variance = float((w**2 * open_ / pi).sum() + precision @ fixed)
         costs.append(variance * (float(pi.mean()) + FORESEEN_COST))
     best = int(np.argmin(costs))
@@ -242,7 +242,7 @@ def fit_chances(
     return at
 
 
-def _combined(factors: FloatArray, terms: FloatArray) -> FloatArray:
+def _sum_terms(factors: FloatArray, terms: FloatArray) -> FloatArray:
     """Return a sum of terms (k, runs) with factors (k,), the same for a run alone as among many."""
     result = np.zeros(terms.shape[1])
     for factor, term in zip(factors.tolist(), terms, strict=True):
@@ -276,7 +276,7 @@ def round_ends(replicas: int, batch: int | None) -> list[int]:
     return [*ends, replicas]
 
 
-def drawn(probability: FloatArray, uniform: Sequence[float]) -> tuple[BoolArray, FloatArray]:
+def draw_runs(probability: FloatArray, uniform: Sequence[float]) -> tuple[BoolArray, FloatArray]:
     """Return which runs are flown, and for how many each stands."""
     flown = np.asarray(uniform) < probability
     return flown, np.where(flown, 1.0 / probability, 0.0)

@@ -17,9 +17,9 @@ from operator import itemgetter
 import numpy as np
 
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.replicas.replicas import most_together, why_apart
+from dsa_des.replicas.replicas import largest_lock_step, lock_step_refusal
 from dsa_des.running.loops import opened_loops
-from dsa_des.studies.chunk import Done, crashed_run, joined
+from dsa_des.studies.chunk import Done, crashed_run, join_pieces
 from dsa_des.studies.study import Chunk, Study
 
 #: How often a chunk may lose its process before it is cut.
@@ -50,7 +50,7 @@ class Attempts:
         self._missing: dict[str, int] = {}
         self._there: dict[str, list[Done]] = {}
 
-    def next(self) -> Piece | None:
+    def next_piece(self) -> Piece | None:
         """Return what to run next; None if nothing may be begun now."""
         piece = None
         if self._only:
@@ -66,17 +66,17 @@ class Attempts:
 
     def give_back(self, piece: Piece) -> None:
         """Take back what was not begun, or was lost through no fault of its own."""
-        self._ended()
+        self._check_ended()
         self._again.append(piece)
 
-    def done(self, piece: Piece, results: Iterable[Done]) -> list[Done]:
+    def finish(self, piece: Piece, results: Iterable[Done]) -> list[Done]:
         """Take the results of a piece; return those of chunks of which all is there."""
-        self._ended()
+        self._check_ended()
         return [whole for one in results if (whole := self._collect(one)) is not None]
 
-    def lost(self, piece: Piece) -> list[Done]:
+    def take_back(self, piece: Piece) -> list[Done]:
         """Take back a piece whose process died; return its chunk's result if that was the last."""
-        self._ended()
+        self._check_ended()
         chunk, losses = piece.chunks[0], piece.losses + 1
         if len(piece.chunks) > 1:
             self._again += [Piece((one,)) for one in reversed(piece.chunks)]
@@ -94,7 +94,7 @@ class Attempts:
                 self._again.append(Piece((half,), 0 if len(half) == 1 else losses - 1))
         return []
 
-    def _ended(self) -> None:
+    def _check_ended(self) -> None:
         self._running -= 1
         self._only = False
 
@@ -107,7 +107,7 @@ class Attempts:
         if self._missing[name]:
             return None
         del self._missing[name]
-        return joined(name, self._there.pop(name))
+        return join_pieces(name, self._there.pop(name))
 
 
 def run_together(
@@ -117,11 +117,11 @@ def run_together(
     if len(chunks) < 2:
         yield from ((chunk,) for chunk in chunks)
         return
-    most = _most_shared(study, chunks[0].runs[0][0])
-    total = sum(chunk.flown for chunk in chunks)
+    most = _lock_step_size(study, chunks[0].runs[0][0])
+    total = sum(chunk.expected_flown for chunk in chunks)
     per = total / (workers * math.ceil(total / (workers * most))) if most else 0.0
     for cell_goes_on in _chains(chunks):
-        flown = np.array([chunk.flown for chunk in cell_goes_on])
+        flown = np.array([chunk.expected_flown for chunk in cell_goes_on])
         count = math.ceil(flown.sum() / per - 1e-9) if most else len(flown)
         of = ((np.cumsum(flown) - 0.5 * flown) * (count / flown.sum())).astype(int).tolist()
         for _, mine in groupby(zip(of, cell_goes_on, strict=True), key=itemgetter(0)):
@@ -139,18 +139,20 @@ def _chains(chunks: Iterable[Chunk]) -> Iterator[list[Chunk]]:
     yield chain
 
 
-def _most_shared(study: Study, cell: int) -> int:
+def _lock_step_size(study: Study, cell: int) -> int:
     """Return how many runs of a cell a lock step holds, 0 where it spares nothing.
 
     A feedback loop goes through as many windows, whatever these hold.
     """
     try:
         scene = study.scene(cell)
-        if not opened_loops(scene) or why_apart(scene, [study.replica(n, cell) for n in (0, 1)]):
+        if not opened_loops(scene) or lock_step_refusal(
+            scene, [study.replica(n, cell) for n in (0, 1)]
+        ):
             return 0
     except (SceneError, BlockFailure):  # its rows say why
         return 0
-    return most_together(scene)
+    return largest_lock_step(scene)
 
 
 def halves(chunk: Chunk) -> tuple[Chunk, Chunk]:

@@ -9,7 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.component import as_written
+from dsa_des.block.component import scene_number
 from dsa_des.block.source_file import absolute
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.keys import flat
@@ -74,7 +74,7 @@ def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
         if "files" in spec:
             return _files(key, spec)
         if "set" in spec:
-            return _linked(key, spec)
+            return _linked_axis(key, spec)
         if "beat_with" in spec:
             values = _phases(key, spec, scene)
         elif "values" in spec:
@@ -174,7 +174,7 @@ def _is(path: Path, what: Callable[[Path], bool]) -> bool:
         return False
 
 
-def _linked(key: str, spec: Mapping[str, Any]) -> Axis:
+def _linked_axis(key: str, spec: Mapping[str, Any]) -> Axis:
     labels, keys = spec.get("values"), spec["set"]
     if not isinstance(labels, list) or not labels or not isinstance(keys, dict) or not keys:
         raise ValueError(
@@ -220,15 +220,15 @@ def _range(spec: Mapping[str, Any]) -> list[Any]:
         step = (high - low) / (count - 1) if count > 1 else Fraction(0)
     _refuse_many(count)
     if not log:
-        return [as_written(low + k * step) for k in range(count)]
+        return [scene_number(low + k * step) for k in range(count)]
     if low <= 0:
         raise ValueError("a logarithmic range must start above 0")
     if count == 1:
-        return [as_written(low)]
+        return [scene_number(low)]
     growth = math.log(high / low) / (count - 1)
     # Six digits: rates stay short fractions, so that clocks have a common tick.
     inner = [float(f"{float(low) * math.exp(growth * k):.6g}") for k in range(1, count - 1)]
-    return [as_written(low), *inner, as_written(high)]
+    return [scene_number(low), *inner, scene_number(high)]
 
 
 def _phases(key: str, spec: Mapping[str, Any], scene: Scene) -> list[Any]:
@@ -253,7 +253,7 @@ def _phases(key: str, spec: Mapping[str, Any], scene: Scene) -> list[Any]:
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise ValueError("steps is how many phases: a whole number of 1 or more")
     _refuse_many(steps)
-    return [as_written(beat_period_s(*periods) * k / steps) for k in range(steps)]
+    return [scene_number(beat_period_s(*periods) * k / steps) for k in range(steps)]
 
 
 def beat_period_s(first: Fraction, second: Fraction) -> Fraction:

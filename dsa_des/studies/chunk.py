@@ -23,12 +23,12 @@ import pyarrow.parquet as pq
 
 from dsa_des.arrays.column_values import Text
 from dsa_des.arrays.types import AnyArray, IntArray
-from dsa_des.block.foreign_calls import error_text, must_pass
+from dsa_des.block.foreign_calls import error_text, is_stop_request
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.files.sealed_files import parquet
-from dsa_des.record.undone import Undone, added
+from dsa_des.record.undone import Undone, add_counts
 from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.replicas import Failed, Recorded, most_together, run_replicas, undone_in
+from dsa_des.replicas.replicas import Failed, Recorded, largest_lock_step, run_replicas, undone_in
 from dsa_des.results.folder import undone_of
 from dsa_des.results.record import (
     CRASHED,
@@ -41,9 +41,9 @@ from dsa_des.results.record import (
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Allocation
-from dsa_des.studies.foreseen import chosen, foresee_all, geometry_of
-from dsa_des.studies.metric import Group, Metric, no_values, one_by_one, wanted_by
-from dsa_des.studies.splitting import Nearness, SplitEvent, split
+from dsa_des.studies.foreseen import choose_runs, foresee_all, geometry_of
+from dsa_des.studies.metric import Group, Metric, columns_wanted, measure_one_by_one, missing_values
+from dsa_des.studies.splitting import Nearness, SplitEvent, run_split
 from dsa_des.studies.study import Chunk, Study, set_text
 
 #: After so many runs at once a worker looks for garbage, or the next ones stand beside it.
@@ -88,12 +88,12 @@ def run_chunk(study: Study, chunk: Chunk) -> Done:
 
 def run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[Done]:
     """Run chunks of one round together, each as it would be by itself."""
-    with _few_collections():
+    with _delay_garbage_collection():
         return _run_chunks(study, chunks)
 
 
 @contextmanager
-def _few_collections() -> Iterator[None]:
+def _delay_garbage_collection() -> Iterator[None]:
     """Look for garbage seldom: what a lock step makes is there to its end."""
     usual = gc.get_threshold()
     gc.set_threshold(max(usual[0], _OBJECTS_AT_ONCE) if usual[0] else 0, *usual[1:])
@@ -122,7 +122,7 @@ def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[Done]:
             tables[k].append(rows.slice(begin, end - start))
             begin += end - start
     done = [
-        done_of(chunk.name, pa.concat_tables(parts), added(said))
+        done_of(chunk.name, pa.concat_tables(parts), add_counts(said))
         for chunk, parts, said in zip(chunks, tables, undone, strict=True)
     ]
     runs = sum(map(len, chunks))
@@ -153,10 +153,10 @@ def done_of(name: str, table: pa.Table, undone: Undone) -> Done:
     return Done(name, parquet(table, about), table.num_rows, failed, status.count(CRASHED))
 
 
-def joined(name: str, parts: Sequence[Done]) -> Done:
+def join_pieces(name: str, parts: Sequence[Done]) -> Done:
     """Return pieces of a chunk as one, in order of cell and replica."""
     tables = [pq.read_table(pa.BufferReader(part.content)) for part in parts]
-    undone = added(map(undone_of, tables))
+    undone = add_counts(map(undone_of, tables))
     rows = pa.concat_tables([table.replace_schema_metadata(None) for table in tables])
     done = done_of(name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), undone)
     return replace(done, cpu_s=sum(part.cpu_s for part in parts))
@@ -199,7 +199,7 @@ def _table(
         if field.name in rows:
             arrays.append(pa.array(rows[field.name], type=field.type))
         else:
-            column = values.get(field.name, no_values(count, text=field.type == pa.string()))
+            column = values.get(field.name, missing_values(count, text=field.type == pa.string()))
             arrays.append(pa.array(column, type=field.type, from_pandas=True))
     return pa.Table.from_arrays(arrays, schema=schema)
 
@@ -234,36 +234,36 @@ def _run_cell(
         ) -> tuple[dict[str, AnyArray], list[str | None]]:
             wrong: list[str | None] = [None] * len(runs)
             chunk_of, said = np.append(of, len(undone)), [*undone, []]  # that of the pilot is lost
-            return _flown(scene, [nearness], runs, wrong, key, chunk_of[number], said), wrong
+            return _fly_replicas(scene, [nearness], runs, wrong, key, chunk_of[number], said), wrong
 
-        rows["error"], values = split(
+        rows["error"], values = run_split(
             study.splitting, metrics[0], numbers, lambda number: study.repetition(number, cell),
             measure, known=repr((study.tables, study.base.data, study.seed, study.sets,
                                  study.swaps, cell)),
         )  # fmt: skip
         return _table(study, schema, cell, rows, values)
     if not study.allocate:
-        values = _flown(scene, metrics, replicas, rows["error"], key, of, undone)
+        values = _fly_replicas(scene, metrics, replicas, rows["error"], key, of, undone)
         return _table(study, schema, cell, rows, values)
     known, errors = foresee_all(scene, metrics, replicas)
     for k, text in errors.items():
         rows["error"][k] = text
     results = [result for metric in metrics for result in metric.results()]
-    shares, predicted = chosen(study, cell, numbers, plan, results, known)
+    shares, predicted = choose_runs(study, cell, numbers, plan, results, known)
     these = [k for k in np.flatnonzero(shares).tolist() if k not in errors]
     wrong: list[str | None] = [None] * len(these)
     some = [replicas[k] for k in these]
-    flown = _flown(scene, metrics, some, wrong, key, of[these], undone)
+    flown = _fly_replicas(scene, metrics, some, wrong, key, of[these], undone)
     for k, said in zip(these, wrong, strict=True):
         rows["error"][k] = said
     values = {}
     for name, column in flown.items():
-        values[name] = no_values(len(numbers), text=column.dtype == object)
+        values[name] = missing_values(len(numbers), text=column.dtype == object)
         values[name][these] = column
     return _table(study, schema, cell, rows, values | known | predicted | {STANDS_FOR: shares})
 
 
-def _flown(
+def _fly_replicas(
     scene: Scene,
     metrics: Sequence[Metric],
     replicas: Sequence[Replica],
@@ -281,16 +281,16 @@ def _flown(
     if len(_bytes_of_a_run) > _MOST_KNOWN:
         _bytes_of_a_run.clear()
     if key not in _bytes_of_a_run and len(replicas) > _FIRST_RUNS:
-        _bytes_of_a_run[key] = _likely_bytes(scene, replicas[0], wanted_by(metrics))
+        _bytes_of_a_run[key] = _likely_bytes(scene, replicas[0], columns_wanted(metrics))
     while done < len(replicas):
         # What runs together is measured together: of what blocks make for a batch nothing is made
         # again for the metrics, however many runs the chunk holds.
         one_run = _bytes_of_a_run.get(key, _MOST_BYTES / _FIRST_RUNS)
-        most = min(most_together(scene), max(1, int(_MOST_BYTES / max(1.0, one_run))))
+        most = min(largest_lock_step(scene), max(1, int(_MOST_BYTES / max(1.0, one_run))))
         left = len(replicas) - done
         many = math.ceil(left / math.ceil(left / most))
         part = replicas[done : done + many]
-        outcomes = _outcomes(scene, part, wanted_by(metrics))
+        outcomes = _outcomes(scene, part, columns_wanted(metrics))
         for chunk in np.unique(of[done : done + many]).tolist():
             mine = np.flatnonzero(of[done : done + many] == chunk)
             undone[chunk].append(undone_in(outcomes[k] for k in mine))
@@ -301,9 +301,9 @@ def _flown(
         for k, outcome in enumerate(outcomes):
             if isinstance(outcome, Failed):
                 errors[done + k] = outcome.error
-        result, wrong = _measured(scene, metrics, [(part[k], outcomes[k]) for k in good])
+        result, wrong = _measure(scene, metrics, [(part[k], outcomes[k]) for k in good])
         for name, column in result.items():
-            nothing = no_values(len(replicas), text=column.dtype == object)
+            nothing = missing_values(len(replicas), text=column.dtype == object)
             values.setdefault(name, nothing)[done + np.array(good)] = column
         for k, text in wrong.items():
             errors[done + good[k]] = text
@@ -349,23 +349,23 @@ def _outcomes(
     return [_outcomes(scene, [replica], wanted)[0] for replica in replicas]
 
 
-def _measured(
+def _measure(
     scene: Scene, metrics: Sequence[Metric], runs: Sequence[tuple[Replica, Any]]
 ) -> tuple[dict[str, AnyArray], dict[int, str]]:
     """Return result → values over the runs, and the error of every run that gave none."""
     if not runs:
         return {}, {}
     group = Group(
-        scene, [replica for replica, _ in runs], [run for _, run in runs], wanted_by(metrics)
+        scene, [replica for replica, _ in runs], [run for _, run in runs], columns_wanted(metrics)
     )
     values: dict[str, AnyArray] = {}
     for metric in metrics:
         try:
             values.update(metric.measure(group))
         except BaseException as error:
-            if must_pass(error):
+            if is_stop_request(error):
                 raise
             if len(runs) == 1:
                 return {}, {0: f"metric {type(metric).__name__}: {error_text(error)}"}
-            return one_by_one(partial(_measured, scene, metrics), runs)
+            return measure_one_by_one(partial(_measure, scene, metrics), runs)
     return values, {}

@@ -20,7 +20,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
 
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.foreign import is_ours
 from dsa_des.errors import UsageError
 from dsa_des.results.folder import Parts
@@ -92,14 +92,14 @@ class Local:
         while True:
             for depth in range(1, _AHEAD + 1):  # each worker has something before any has more
                 for worker in self._workers:
-                    if len(worker) < depth and (piece := attempts.next()) is not None:
+                    if len(worker) < depth and (piece := attempts.next_piece()) is not None:
                         worker.submit(piece, parts)
             running = [future for worker in self._workers for future in worker.futures()]
             if not running:
                 return
             wait(running, return_when=FIRST_COMPLETED)
             for worker in self._workers:
-                yield from _finished(worker, attempts)
+                yield from _finished_pieces(worker, attempts)
 
     def close(self) -> None:
         """Stop all workers."""
@@ -156,15 +156,15 @@ class _Worker:
             self._pool = None
 
 
-def _finished(worker: _Worker, attempts: Attempts) -> Iterator[Done]:
+def _finished_pieces(worker: _Worker, attempts: Attempts) -> Iterator[Done]:
     while (first := worker.pop()) is not None:
         future, piece = first
         try:
-            done = attempts.done(piece, future.result())
+            done = attempts.finish(piece, future.result())
         except BrokenProcessPool:
             for other in worker.renew():
                 attempts.give_back(other)
-            done = attempts.lost(piece)
+            done = attempts.take_back(piece)
         yield from done
 
 
@@ -216,7 +216,9 @@ def _new_pool(study: Study) -> ProcessPoolExecutor:
 
 def _our_modules(study: Study) -> list[str]:
     """Return the modules of a study's blocks that belong to this program."""
-    ours = {point.module.partition(".")[0] for point in registered().values() if is_ours(point)}
+    ours = {
+        point.module.partition(".")[0] for point in entry_points_of().values() if is_ours(point)
+    }
     modules = {block.cls.__module__ for block in study.scene(0).blocks.values()}
     return sorted(name for name in modules if name.partition(".")[0] in ours)
 
@@ -293,7 +295,7 @@ class Dask:
         most = max(8, 4 * workers)
 
         def submit() -> None:
-            while len(given) < most and (piece := attempts.next()) is not None:
+            while len(given) < most and (piece := attempts.next_piece()) is not None:
                 future = self._client.submit(run_and_write, study, parts, piece.chunks, pure=False)
                 given[future.key] = piece
                 running.add(future)
@@ -304,9 +306,9 @@ class Dask:
         for future in running:
             piece = given.pop(future.key)
             try:
-                done = attempts.done(piece, future.result())
+                done = attempts.finish(piece, future.result())
             except KilledWorker:
-                done = attempts.lost(piece)
+                done = attempts.take_back(piece)
             submit()
             yield from done
             if not given:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, FloatArray
-from dsa_des.block.foreign_calls import error_text, must_pass
+from dsa_des.block.foreign_calls import error_text, is_stop_request
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.record import (
@@ -33,11 +33,11 @@ from dsa_des.studies.allocation import (
     UNTOLD,
     Allocation,
     ForeseenRuns,
-    drawn,
+    draw_runs,
     learn,
 )
 from dsa_des.studies.draws import uniform
-from dsa_des.studies.metric import Group, Metric, expected_column, one_by_one
+from dsa_des.studies.metric import Group, Metric, expected_column, measure_one_by_one
 from dsa_des.studies.study import AUTO, Study
 
 #: Runs that are foreseen at a time, at most: few enough for the memory, many for the work.
@@ -45,13 +45,13 @@ _AT_ONCE = 4096
 
 
 def geometry_of(metrics: Sequence[Metric]) -> list[str]:
-    """Return the names of all numbers by which runs are told apart before they are flown."""
+    """Return the names of the geometric quantities known of runs before they are flown."""
     names = dict.fromkeys(name for metric in metrics for name in metric.geometry)
     ratios = [one.ratio for metric in metrics for one in metric.results() if one.ratio is not None]
     return [*names, *dict.fromkeys(predicted_column(of.above) for of in ratios if names)]
 
 
-def why_not_foreseen(study: Study, scene: Scene) -> str:
+def allocation_refusal(study: Study, scene: Scene) -> str:
     """Return why a sample of the runs cannot answer a study; nothing if it can."""
     metrics = {spec.name: spec.build(scene) for spec in study.metrics}
     blind = [name for name, one in metrics.items() if type(one).foresee is Metric.foresee]
@@ -73,7 +73,7 @@ def why_not_foreseen(study: Study, scene: Scene) -> str:
 
 
 def ratios_of(results: Sequence[Result], allocate: Sequence[str]) -> list[Result]:
-    """Return the ratios for whose sake runs are chosen: those named, or all without a class."""
+    """Return the ratios that the choice of runs optimises: those named, or all without a class."""
     ratios = [result for result in results if result.ratio is not None]
     if AUTO in allocate:
         return [one for one in ratios if one.ratio is not None and one.ratio.only is None]
@@ -106,14 +106,14 @@ def foresee_all(
     try:
         return foresee(scene, metrics, replicas), {}
     except BaseException as error:
-        if must_pass(error):
+        if is_stop_request(error):
             raise
         if len(replicas) == 1:
             return {}, {0: f"before it is flown: {error_text(error)}"}
-    return one_by_one(partial(foresee_all, scene, metrics), replicas)
+    return measure_one_by_one(partial(foresee_all, scene, metrics), replicas)
 
 
-def chosen(
+def choose_runs(
     study: Study,
     cell: int,
     numbers: Sequence[int],
@@ -130,15 +130,15 @@ def chosen(
     ratios = [one.ratio for one in ratios_of(results, study.allocate) if one.ratio is not None]
     seed = study.member_seed(cell)
     draws = [uniform(seed, "study allocation", number) for number in numbers]
-    known = _known(columns, ratios)
+    known = _known_runs(columns, ratios)
     predicted: dict[str, FloatArray] = {}
     for of, chance in zip(ratios, plan.predictions(known), strict=True):
         name = geometry_column(predicted_column(of.above))
         predicted[name] = np.maximum(predicted.get(name, 0.0), chance)
-    return drawn(plan.probabilities(known), draws)[1], predicted
+    return draw_runs(plan.probabilities(known), draws)[1], predicted
 
 
-def _known(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> ForeseenRuns:
+def _known_runs(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> ForeseenRuns:
     chances = [geometry_column(expected_column(of.above)) for of in ratios]
     names = sorted(name for name in columns if name.startswith(geometry_column("")))
     chance = tuple(geometry_column(of("")) for of in (expected_column, predicted_column))
@@ -191,7 +191,7 @@ def plans_of(
             continue
         happened = [_of_class(columns, of, columns[of.above]) for of in ratios]
         least = LEAST if first >= PILOT else FIRST_LEAST
-        plans[int(cell)] = learn(_known(columns, ratios), np.array(happened), stood, least)
+        plans[int(cell)] = learn(_known_runs(columns, ratios), np.array(happened), stood, least)
     return plans
 
 
@@ -204,4 +204,6 @@ def _first_plan(study: Study, cell: int, ratios: Sequence[RatioOf]) -> Allocatio
     except Exception:  # the rows of its runs say what is wrong
         return None
     none = np.zeros(len(replicas))
-    return learn(_known(columns, ratios), np.zeros((len(ratios), len(none))), none, FIRST_LEAST)
+    return learn(
+        _known_runs(columns, ratios), np.zeros((len(ratios), len(none))), none, FIRST_LEAST
+    )

@@ -25,7 +25,7 @@ from dsa_des.results.folder import StudyFolder
 from dsa_des.results.labels import short
 from dsa_des.results.models import EXPLAINED, Explained, SceneRecord, read_explained, versions
 from dsa_des.results.record import Result, StudyRecord, draw_column
-from dsa_des.scene.keys import in_words
+from dsa_des.scene.keys import name_items
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.axes import Axis
@@ -97,13 +97,13 @@ def _files_in(value: Any, beside: Sequence[Path]) -> set[Path]:
     if not isinstance(value, str):
         return set()
     try:
-        files = _module_of(value, beside) or _named(value)
+        files = _module_of(value, beside) or _named_files(value)
         return set() if files is None else files | _extended_by(files)
     except (OSError, ValueError):  # a text that can be no path
         return set()
 
 
-def _named(text: str) -> set[Path] | None:
+def _named_files(text: str) -> set[Path] | None:
     """Return the file of this name, or those of a run's folder."""
     folder, path = getattr(text, "folder", None), resolve_home(text)
     if folder is None and not path.is_absolute():
@@ -153,10 +153,10 @@ def results_of(study: Study) -> list[Result]:
     scene = study.scene(0)
     results = [result for spec in study.metrics for result in spec.build(scene).results()]
     marks = marks_of({name: block.cls for name, block in scene.blocks.items()})
-    return [_marked(result, scene, marks) for result in results]
+    return [_add_mark(result, scene, marks) for result in results]
 
 
-def _marked(result: Result, scene: Scene, marks: Mapping[str, Mark]) -> Result:
+def _add_mark(result: Result, scene: Scene, marks: Mapping[str, Mark]) -> Result:
     """Return a result with the mark of its block, if that block's class has one."""
     name = result.block or result.name.partition(".")[2]
     if name not in scene.blocks or getattr(scene.blocks[name].cls, "mark", None) is None:
@@ -171,16 +171,16 @@ def is_category(axis: Axis, scene: Scene) -> bool:
         if len(parts) != 3 or parts[0] != "blocks" or parts[1] not in scene.blocks:
             return False
         known = scene.blocks[parts[1]].cls.Parameters.model_fields.get(parts[2])
-        if known is None or not _of_names(known.annotation):
+        if known is None or not _is_of_names(known.annotation):
             return False
     return bool(axis.swaps and axis.swaps[0]) or bool(axis.sets and axis.sets[0])
 
 
-def _of_names(annotation: Any) -> bool:
+def _is_of_names(annotation: Any) -> bool:
     if get_origin(annotation) is Literal or annotation is bool:
         return True
     parts = [part for part in get_args(annotation) if part is not type(None)]
-    return bool(parts) and all(_of_names(part) for part in parts)
+    return bool(parts) and all(_is_of_names(part) for part in parts)
 
 
 def record_text(study: Study, digest: str) -> str:
@@ -196,7 +196,7 @@ def record_text(study: Study, digest: str) -> str:
         "axes": [
             {
                 "column": axis.column,
-                "words": in_words(study.base.data, axis.key).removeprefix("blocks."),
+                "words": name_items(study.base.data, axis.key).removeprefix("blocks."),
                 "values": axis.labels,
                 "over": axis.column in study.over,
                 "numeric": axis.numeric,
@@ -237,7 +237,7 @@ def record_text(study: Study, digest: str) -> str:
     return json.dumps(json_safe(content), indent=2, allow_nan=False) + "\n"
 
 
-def explained(study: Study) -> Explained:
+def explain_study(study: Study) -> Explained:
     """Return of what a study's runs are made."""
     scenes: list[SceneRecord] = []
     text = ""
@@ -250,12 +250,12 @@ def explained(study: Study) -> Explained:
             text = text or to_toml(scene.resolved())
         except (SceneError, BlockFailure, ValueError):
             continue  # its rows say why
-        scenes.append(_less(record, scenes[0]) if scenes else record)
+        scenes.append(_subtract_record(record, scenes[0]) if scenes else record)
     scenes = [one for one in scenes if one.models or one.effects or one.spared]
     return Explained(versions=versions(), scene=text, scenes=scenes)
 
 
-def _less(result: SceneRecord, first: SceneRecord) -> SceneRecord:
+def _subtract_record(result: SceneRecord, first: SceneRecord) -> SceneRecord:
     """Return what is not so in the first scene."""
     lists = ("models", "effects", "spared")
     new = {n: [one for one in getattr(result, n) if one not in getattr(first, n)] for n in lists}
@@ -265,6 +265,6 @@ def _less(result: SceneRecord, first: SceneRecord) -> SceneRecord:
 def keep_explained(study: Study, folder: StudyFolder) -> None:
     """Write ``explained.json`` into a study's folder, unless it is there."""
     if read_explained(folder) is None:
-        content = explained(study).model_dump()
+        content = explain_study(study).model_dump()
         text = json.dumps(content, indent=1, allow_nan=False) + "\n"
         folder.write_file(EXPLAINED, text.encode())

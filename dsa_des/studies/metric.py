@@ -14,7 +14,7 @@ import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.block.component import Component, Parameters
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.foreign import NotImportable, load_named, load_point
 from dsa_des.block.message import Columns, Text
 from dsa_des.block.registry import ClassText
@@ -39,9 +39,28 @@ from dsa_des.scene.scene import Scene
 
 #: What authors of metrics import from here.
 __all__ = [
-    "CLASS", "EVENT", "FRACTION", "KEY", "METRICS", "NUMBER", "RATIO", "SHARE", "TRIALS", "Group",
-    "Metric", "RatioOf", "Result", "Told", "check_recorded", "check_tables", "expected_column",
-    "find_metric", "no_values", "one_by_one", "recorded_by", "wanted_by",
+    "CLASS",
+    "EVENT",
+    "FRACTION",
+    "KEY",
+    "METRICS",
+    "NUMBER",
+    "RATIO",
+    "SHARE",
+    "TRIALS",
+    "Group",
+    "Metric",
+    "RatioOf",
+    "Result",
+    "Told",
+    "check_recorded",
+    "check_tables",
+    "columns_wanted",
+    "expected_column",
+    "find_metric",
+    "measure_one_by_one",
+    "missing_values",
+    "recorded_by",
 ]  # fmt: skip
 
 METRICS = "dsa_des.metrics"
@@ -76,7 +95,7 @@ class Group:
         self.ended_early: BoolArray = np.array([run.ended_early for run in recorded], dtype=bool)
         #: Table name → columns, with ``replica``; rows are in order of replica and time.
         self.tables: dict[str, Columns] = {
-            table: _together(table, wanted[table], recorded) for table in sorted(wanted)
+            table: _concatenate_columns(table, wanted[table], recorded) for table in sorted(wanted)
         }
 
         self._known: dict[Any, Any] = {}
@@ -84,7 +103,7 @@ class Group:
     def __len__(self) -> int:
         return len(self.replicas)
 
-    def once(self, key: Any, make: Callable[[], _T]) -> _T:
+    def cached(self, key: Any, make: Callable[[], _T]) -> _T:
         """Return what `make` returns, made once per group and key: metrics may share work."""
         if key not in self._known:
             self._known[key] = make()
@@ -104,17 +123,17 @@ class Group:
                 return self.scenes.parameters_of(block)
             return [scene.blocks[block].parameters for scene in self.scenes]
 
-        return self.once(("parameters", block), parameters)
+        return self.cached(("parameters", block), parameters)
 
 
-def _together(table: str, columns: Any, recorded: Sequence[Recorded]) -> Columns:
+def _concatenate_columns(table: str, columns: Any, recorded: Sequence[Recorded]) -> Columns:
     parts = [part for part in _parts(table, recorded) if len(part["tick"])]
-    joined: Columns = {"replica": _joined([part["replica"] for part in parts])}
+    joined: Columns = {"replica": _concatenate([part["replica"] for part in parts])}
     for name in columns:
         if any(name not in part for part in parts):
             continue  # a recording of before the column; a metric asks whether it is there
         if parts:
-            joined[name] = _joined([part[name] for part in parts])
+            joined[name] = _concatenate([part[name] for part in parts])
             continue
         text = any(isinstance(run.tables.get(table, {}).get(name), Text) for run in recorded)
         none = np.empty(0, dtype=np.int64)
@@ -141,7 +160,7 @@ def _parts(table: str, recorded: Sequence[Recorded]) -> Iterator[Columns]:
         start += 1
 
 
-def _joined(pieces: Sequence[Any]) -> Any:
+def _concatenate(pieces: Sequence[Any]) -> Any:
     if len(pieces) == 1:
         return pieces[0]
     if pieces and isinstance(pieces[0], Text):
@@ -248,9 +267,9 @@ def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:
     """Return a registered metric, or that of ``module:Class`` or ``./file.py:Class``."""
     if isinstance(name, ClassText):
         return _metric(name, name.cls)
-    point = registered(METRICS).get(name)
+    point = entry_points_of(METRICS).get(name)
     if point is None and ":" not in name:
-        hint = did_you_mean(name, registered(METRICS))
+        hint = did_you_mean(name, entry_points_of(METRICS))
         raise ValueError(f"unknown metric{hint} (or module:Class)")
     try:
         result = (
@@ -307,7 +326,7 @@ def check_recorded(metric: Metric, blocks: Mapping[str, Component]) -> None:
                          + "".join(asked))  # fmt: skip
 
 
-def wanted_by(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:
+def columns_wanted(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:
     """Return which columns of which tables metrics need, sorted; ``tick`` always."""
     wanted: dict[str, set[str]] = {}
     for metric in metrics:
@@ -316,12 +335,12 @@ def wanted_by(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:
     return {table: tuple(sorted(columns)) for table, columns in sorted(wanted.items())}
 
 
-def no_values(count: int, *, text: bool) -> AnyArray:
+def missing_values(count: int, *, text: bool) -> AnyArray:
     """Return what stands for as many values that are not there."""
     return np.full(count, None, dtype=object) if text else np.full(count, np.nan)
 
 
-def one_by_one(
+def measure_one_by_one(
     measure: Callable[[Sequence[Any]], tuple[dict[str, AnyArray], dict[int, str]]],
     runs: Sequence[Any],
 ) -> tuple[dict[str, AnyArray], dict[int, str]]:
@@ -333,6 +352,6 @@ def one_by_one(
         if wrong:
             errors[k] = wrong[0]
         for name, column in values.items():
-            nothing = no_values(len(runs), text=column.dtype == object)
+            nothing = missing_values(len(runs), text=column.dtype == object)
             result.setdefault(name, nothing)[k] = column[0]
     return result, errors

@@ -12,12 +12,12 @@ import pyarrow.compute as pc
 
 from dsa_des.errors import SceneError, UsageError
 from dsa_des.replicas.changed_scene import scene_of
-from dsa_des.replicas.replicas import why_apart
+from dsa_des.replicas.replicas import lock_step_refusal
 from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.record import CRASHED
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.results.tables import Expected, Tables
-from dsa_des.studies.chunk import Done, done_of, joined
+from dsa_des.studies.chunk import Done, done_of, join_pieces
 from dsa_des.studies.executors import Executor
 from dsa_des.studies.foreseen import plans_of
 from dsa_des.studies.identity import keep_explained, record_of, results_of
@@ -39,14 +39,14 @@ class Stopped(Exception):
     """A study was interrupted, or its results could not be written; it can be resumed."""
 
 
-def why_one_by_one(study: Study) -> str | None:
+def study_lock_step_refusal(study: Study) -> str | None:
     """Return why replicas of the first or the last cell cannot run in lock step, if so."""
     if study.replicas < 2:
         return None
     for cell in sorted({0, len(study.cells) - 1}):
         replicas = [study.replica(number, cell) for number in range(2)]
         try:
-            reason = why_apart(study.scene(cell), replicas)
+            reason = lock_step_refusal(study.scene(cell), replicas)
         except SceneError:  # its rows say so
             continue
         if reason is not None:
@@ -71,7 +71,7 @@ def run_study(
     try:
         for number, first in enumerate(starts):
             if number and study.stop_when is not None:
-                satisfied = _satisfied(study, folder, number)
+                satisfied = _satisfied_cells(study, folder, number)
                 left = [cell for cell in cells if cell not in satisfied]
                 done_with = len(cells) - len(left)
                 progress.total -= done_with * (study.replicas - first)
@@ -103,7 +103,7 @@ def _run_round(
     kept: dict[str, Done] = {}
     for chunk in chunks:
         rows = folder.part(chunk.name)
-        if rows is None or not _same_runs(rows, chunk):
+        if rows is None or not _is_same_runs(rows, chunk):
             missing.append(chunk)
             continue
         undone = folder.undone([chunk.name])
@@ -118,7 +118,7 @@ def _run_round(
     report(progress)
     try:
         for done in executor.run(study, folder.destination, missing):
-            whole = joined(done.name, [kept[done.name], done]) if done.name in kept else done
+            whole = join_pieces(done.name, [kept[done.name], done]) if done.name in kept else done
             if whole.content:
                 folder.destination.write(whole.name, whole.content)
             progress.runs += done.runs
@@ -140,7 +140,7 @@ def _remove_rounds(folder: StudyFolder, first: int) -> None:
             folder.remove_part(name)
 
 
-def _same_runs(rows: pa.Table, chunk: Chunk) -> bool:
+def _is_same_runs(rows: pa.Table, chunk: Chunk) -> bool:
     wanted = [np.arange(start, end) for _, start, end in chunk.runs]
     cells = np.repeat([cell for cell, _, _ in chunk.runs], [len(one) for one in wanted])
     return bool(
@@ -159,7 +159,7 @@ def _runs_of(rows: pa.Table) -> tuple[tuple[int, int, int], ...]:
     return tuple(runs)
 
 
-def _satisfied(study: Study, folder: StudyFolder, number: int) -> set[int]:
+def _satisfied_cells(study: Study, folder: StudyFolder, number: int) -> set[int]:
     """Return the cells whose interval is narrow enough after the rounds before `number`."""
     stop = study.stop_when
     assert stop is not None
@@ -180,10 +180,10 @@ _EXPECTED_OVER = 64
 
 def tables_of(study: Study, folder: StudyFolder) -> Tables:
     """Return the tables of a study's results, with the analytic answers of its scenes."""
-    return Tables(record_of(study), folder, _expected(study))
+    return Tables(record_of(study), folder, _expected_answers(study))
 
 
-def _expected(study: Study) -> Expected:
+def _expected_answers(study: Study) -> Expected:
     """Return the analytic answers by axis values, averaged over draws and encounters."""
     sums: dict[tuple[str, tuple[Any, ...]], list[float]] = {}
     many = min(study.replicas, _EXPECTED_OVER) if study.draws else 1

@@ -13,9 +13,9 @@ from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.splitting import FlownRuns, Repeated, find_levels, repeated
+from dsa_des.replicas.splitting import FlownRuns, Repeated, find_levels, run_repetitions
 from dsa_des.results.record import CLASS, EVENT, NUMBER, Result
-from dsa_des.scene.graph import in_cycles
+from dsa_des.scene.graph import cycle_numbers
 from dsa_des.studies.metric import Group, Metric
 
 
@@ -70,11 +70,13 @@ class SplitEvent(Metric):
             Result(f"{name}.levels", CLASS, "levels of the score"),
         ]  # fmt: skip
 
-    def scored(self, score: str, levels: Sequence[float]) -> Nearness:
+    def nearness_to_levels(self, score: str, levels: Sequence[float]) -> Nearness:
         """Return what tells when runs reach some levels of a score."""
         return Nearness(self.metric, self.event, score, levels)
 
-    def told(self, found: Sequence[Repeated], levels: Sequence[float]) -> dict[str, AnyArray]:
+    def results_of_repetitions(
+        self, found: Sequence[Repeated], levels: Sequence[float]
+    ) -> dict[str, AnyArray]:
         """Return result → values of some repetitions; NaN and None of those that failed."""
         text = ", ".join(f"{level:.4g}" for level in levels[:-1]) or "none"
         values = {
@@ -100,7 +102,7 @@ Measure = Callable[
 ]
 
 
-def split(
+def run_split(
     table: Splitting,
     metric: SplitEvent,
     numbers: Sequence[int],
@@ -117,7 +119,7 @@ def split(
     candidates = metric.metric.scores[table.score]
 
     def fly(runs: Sequence[Replica], number: IntArray, levels: Sequence[float]) -> FlownRuns:
-        values, wrong = measure(metric.scored(table.score, levels), runs, number)
+        values, wrong = measure(metric.nearness_to_levels(table.score, levels), runs, number)
         nothing = np.full(len(runs), np.nan)
         times_s = [values.get(str(k), nothing) for k in range(len(levels))]
         return FlownRuns(np.array(times_s), values.get("weight", nothing), wrong)
@@ -130,15 +132,15 @@ def split(
     except ValueError as error:
         return [str(error)] * len(numbers), {}
     runs, seeds = zip(*map(repetition, numbers), strict=True)
-    found = repeated(runs, seeds, levels, fly)
-    return [one.error for one in found], metric.told(found, levels)
+    found = run_repetitions(runs, seeds, levels, fly)
+    return [one.error for one in found], metric.results_of_repetitions(found, levels)
 
 
 #: By all that fixes them: every process finds the levels of a study by itself, and the same ones.
 _levels_found: dict[str, tuple[float, ...]] = {}
 
 
-def why_not_split(
+def splitting_refusal(
     table: Splitting, split_event: SplitEvent, name: str
 ) -> tuple[str, str, Any] | None:
     """Return which key of the table, why, and which value makes splitting impossible; or None.
@@ -150,7 +152,7 @@ def why_not_split(
     if hosted:
         said = f"the block {hosted[0]} waits for a host program, and cannot be flown again"
         return "", said, None
-    if not in_cycles(scene.graph):
+    if not cycle_numbers(scene.graph):
         return "", "the scene has no closed loop: nothing that is drawn changes a flight", None
     events, scores = metric.scored_events(), metric.scores
     if not events:

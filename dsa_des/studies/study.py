@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
-from dsa_des.block.registry import sourced
+from dsa_des.block.registry import add_source
 from dsa_des.block.source_file import absolute
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.record import FigureRecord, Requirement, StopWhen
@@ -27,7 +27,7 @@ from dsa_des.studies.draws import Draw, member_seed, replica_seed
 from dsa_des.studies.metric import Metric, check_tables, find_metric
 from dsa_des.studies.splitting import SplitEvent, Splitting
 from dsa_des.studies.study_tables import existing_file
-from dsa_des.text.run_commands import as_text, run_command
+from dsa_des.text.run_commands import format_value, run_command
 from dsa_des.text.safe_text import shell_line
 from dsa_des.time.randomness import key_of
 
@@ -74,7 +74,7 @@ class Chunk:
         return sum(end - start for _, start, end in self.runs)
 
     @property
-    def flown(self) -> float:
+    def expected_flown(self) -> float:
         """How many of the runs are flown, about."""
         return sum(
             (end - start) * (self.plans[cell].share if cell in self.plans else 1.0)
@@ -141,7 +141,7 @@ class Study:
         return int(np.ravel_multi_index(tuple(indices), self._sizes)) if indices else 0
 
     @property
-    def begun(self) -> int:
+    def runs_begun(self) -> int:
         """How many runs of a cell are begun: replicas, or with splitting those of their stage."""
         return self.replicas * (1 if self.splitting is None else self.splitting.runs)
 
@@ -250,7 +250,7 @@ def set_text(value: Any) -> str:
         from dsa_des.files.toml_files import inline
 
         return inline(value)
-    return as_text(value)
+    return format_value(value)
 
 
 def command_of(words: Iterable[str], sets: Iterable[str], *paths: Path) -> str:
@@ -269,6 +269,6 @@ def changed_scene(
 ) -> Scene:
     """Return the checked scene that swaps and values make of a scene's tables."""
     file, folder = base.copy(), Path(source).parent
-    types = [(SWAP + block, sourced(name, folder)) for block, name in swaps]
+    types = [(SWAP + block, add_source(name, folder)) for block, name in swaps]
     apply_changes(file, [*types, *sets], source, source, "swap")
     return check_scene(file)

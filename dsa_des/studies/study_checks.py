@@ -10,15 +10,15 @@ from dsa_des.errors.budgets import MOST_STUDY_SCANS
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.results.record import FRACTION, NUMBER, RATIO, SHARE, TRIALS, Result
-from dsa_des.results.summary import of_series
+from dsa_des.results.summary import results_of_series
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.keys import Key, key_in
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.draws import Draw
-from dsa_des.studies.foreseen import why_not_foreseen
+from dsa_des.studies.foreseen import allocation_refusal
 from dsa_des.studies.metric import Metric, check_recorded
-from dsa_des.studies.splitting import SplitEvent, why_not_split
+from dsa_des.studies.splitting import SplitEvent, splitting_refusal
 from dsa_des.studies.study import AUTO, Study
 
 #: How many replicas the ends of a range are looked for in.
@@ -62,7 +62,7 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
     if whole and study.splitting is not None:
         split_event = study.metrics[0].build(first)
         assert isinstance(split_event, SplitEvent)
-        if wrong := why_not_split(study.splitting, split_event, study.metrics[0].name):
+        if wrong := splitting_refusal(study.splitting, split_event, study.metrics[0].name):
             key, said, value = wrong
             at = ("splitting", key) if key else ("splitting",)
             file.report(at, said, *([value] if key else []))
@@ -72,7 +72,7 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
         _check_ends(study, scenes, file)
     if len(file.problems) == before and study.allocate:
         try:
-            why_not = why_not_foreseen(study, first)
+            why_not = allocation_refusal(study, first)
         except (SceneError, ValueError) as error:
             why_not = str(error)
         if why_not:
@@ -81,7 +81,7 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
 
 def _check_ends(study: Study, scenes: list[Scene], file: SceneFile) -> None:
     """Set up the last run of each sequence: what it counts may end before, as a file does."""
-    last = study.begun - 1
+    last = study.runs_begun - 1
     for draw in study.draws:
         if draw.kind != "sequence" or not last:
             continue
@@ -96,14 +96,14 @@ def _check_ends(study: Study, scenes: list[Scene], file: SceneFile) -> None:
             else:
                 continue
             file.report(
-                ("draws", draw.key), f"of the last of {study.begun} replicas: {text}", value
+                ("draws", draw.key), f"of the last of {study.runs_begun} replicas: {text}", value
             )
             break
 
 
 def _endless(study: Study, scans: float) -> str:
     """Return why a study whose runs have so many scans is not begun, nothing if it is."""
-    runs = study.begun * len(study.cells)
+    runs = study.runs_begun * len(study.cells)
     if runs * scans <= MOST_STUDY_SCANS:
         return ""
     return (
@@ -159,7 +159,7 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> None:
 
 def _check_names(study: Study, results: Mapping[str, Result], file: SceneFile) -> None:
     """Report names of results that no metric gives, and figures of results they cannot show."""
-    names = [n for n, r in results.items() if not n.endswith(TRIALS) and r.summed_up]
+    names = [n for n, r in results.items() if not n.endswith(TRIALS) and r.is_summarised]
 
     def missing(key: Key, name: str) -> None:
         file.report(key, f"no metric of the study gives it{did_you_mean(name, names)}", name)
@@ -180,7 +180,7 @@ def _check_names(study: Study, results: Mapping[str, Result], file: SceneFile) -
             missing(("requirements", number, "metric"), wanted.metric)
     for number, figure in enumerate(study.figures):
         if figure.kind == "series":
-            if not of_series(str(figure.metric), results):
+            if not results_of_series(str(figure.metric), results):
                 message = "there are no such results with a number behind them (NAME.5, NAME.10)"
                 file.report(("figures", number, "metric"), message, str(figure.metric))
         elif figure.kind != "run" and figure.metric not in names:
@@ -237,7 +237,7 @@ def _worst(draw: Draw, study: Study) -> list[Any]:
     if draw.kind == "choice":
         return list(draw.values)
     if draw.kind == "sequence":
-        return [draw.value(study.seed, number, study.batch) for number in (0, study.begun - 1)]
+        return [draw.value(study.seed, number, study.batch) for number in (0, study.runs_begun - 1)]
     count = 1 if draw.kind == "normal" else min(study.replicas, _MOST_DRAWN)
     cells = study.cells if study.over else range(1)
     seeds = dict.fromkeys(map(study.member_seed, cells[: max(1, _MOST_DRAWN // count)]))

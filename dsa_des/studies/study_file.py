@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from dsa_des.block.component import SourcedText
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.source_file import absolute
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS
@@ -34,7 +34,7 @@ from dsa_des.studies.study_tables import (
     StopWhenTable,
     StudyKeys,
     read_figures,
-    resolved,
+    resolve_tables,
 )
 
 
@@ -69,7 +69,7 @@ def study_of_scene(
         raise SceneError(problems)
     data = {
         "title": scene.stem,
-        "scene": SourcedText.of(str(scene.resolve()), scene.parent),
+        "scene": SourcedText.from_text(str(scene.resolve()), scene.parent),
         "replicas": replicas,
         "seed": seed,
         "metrics": list(metrics),
@@ -91,7 +91,7 @@ def study_of_tables(
     return _StudyReader(SceneFile(Path("study"), tables), base, swaps, sets).study(())
 
 
-def _listed(names: str | list[str]) -> list[str]:
+def _as_list(names: str | list[str]) -> list[str]:
     return [names] if isinstance(names, str) else names
 
 
@@ -141,7 +141,7 @@ class _StudyReader:
             runs_are = f"{cells:,} cells make {runs:,} runs" if runs < 10**18 else "are too many"
             file.report(("replicas",), f"{runs_are}; at most {MOST_RUNS:,} runs are allowed")
             raise SceneError(file.problems)
-        baseline, weight = self.compared(axes)
+        baseline, weight = self.read_compared(axes)
         study = Study(
             path=Path(file.path),
             scene_path=Path(base.path),
@@ -153,7 +153,7 @@ class _StudyReader:
             metrics=specs,
             sets=self.sets(),
             swaps=self.swaps(),
-            over=self.over(axes),
+            over=self.read_over(axes),
             baseline=baseline,
             stop_when=stop_when,
             confidence=keys.confidence,
@@ -168,10 +168,10 @@ class _StudyReader:
             compare_weight=weight,
             requirements=self.requirements(axes),
             splitting=splitting,
-            allocate=() if keys.allocate is None else tuple(_listed(keys.allocate)),
+            allocate=() if keys.allocate is None else tuple(_as_list(keys.allocate)),
             runs_per_chunk=keys.runs_per_chunk or max(1, min(1024, -(-runs // 16))),
             base=base,
-            tables=resolved(self.data, swaps),
+            tables=resolve_tables(self.data, swaps),
         )
         check_cells(study, file, scene)
         file.refuse()
@@ -209,7 +209,7 @@ class _StudyReader:
 
     def scene(self) -> tuple[SceneFile | None, Scene | None]:
         if self._base is not None:
-            return self.checked(self._base)
+            return self.check_base(self._base)
         name = self.keys.scene
         if not isinstance(name, str):
             self.file.report(("scene",), "is required: the TOML file of the scene that is studied")
@@ -228,9 +228,9 @@ class _StudyReader:
         except SceneError as error:
             self.file.problems += error.problems
             return None, None
-        return self.checked(base)
+        return self.check_base(base)
 
-    def checked(self, base: SceneFile) -> tuple[SceneFile | None, Scene | None]:
+    def check_base(self, base: SceneFile) -> tuple[SceneFile | None, Scene | None]:
         for swaps, sets in ((self.swaps(), self.sets()), ((), ())):
             try:
                 return base, changed_scene(base, swaps, sets, str(self.file.path))
@@ -273,14 +273,14 @@ class _StudyReader:
         self.file.report(key, f"the study has no such axis{hint}", str(name))
         return None
 
-    def over(self, axes: tuple[Axis, ...]) -> tuple[str, ...]:
+    def read_over(self, axes: tuple[Axis, ...]) -> tuple[str, ...]:
         names = self.keys.over
         if names is None:
             return tuple(axis.column for axis in axes if axis.files)
         names = [names] if isinstance(names, str) else names
         return tuple(c for n in names if (c := self.column(("over",), n, axes)) is not None)
 
-    def compared(self, axes: tuple[Axis, ...]) -> tuple[tuple[str, Any] | None, str | None]:
+    def read_compared(self, axes: tuple[Axis, ...]) -> tuple[tuple[str, Any] | None, str | None]:
         """Return the value of an axis that others are compared with, and the result that weighs."""
         if self.keys.compare is None:
             first = next((axis for axis in axes if axis.key.startswith("swap.")), None)
@@ -324,7 +324,7 @@ class _StudyReader:
     def metric_specs(self, splitting: Splitting | None) -> tuple[MetricSpec, ...]:
         items = self.keys.metrics
         if not isinstance(items, list) or not items:
-            shown = ", ".join(registered(METRICS))
+            shown = ", ".join(entry_points_of(METRICS))
             self.file.report(("metrics",), f"is required: a list of metrics; there are {shown}")
             return ()
         event = splitting.event if splitting is not None and len(items) == 1 else ""

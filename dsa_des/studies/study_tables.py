@@ -15,7 +15,7 @@ from dsa_des.scene.checks import read_table
 from dsa_des.scene.keys import Key
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.axes import Axis
-from dsa_des.text.run_commands import as_text
+from dsa_des.text.run_commands import format_value
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
 _NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when", "allocate",
@@ -24,7 +24,9 @@ _NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_w
 _PATTERNS = "files"
 
 
-def resolved(data: Mapping[str, Any], swaps: Iterable[tuple[str, list[str]]]) -> dict[str, Any]:
+def resolve_tables(
+    data: Mapping[str, Any], swaps: Iterable[tuple[str, list[str]]]
+) -> dict[str, Any]:
     """Return a study's tables with absolute paths, and further swap axes."""
     tables = {
         key: value if key in _NAMING_RESULTS else _absolute(value) for key, value in data.items()
@@ -77,23 +79,23 @@ def json_safe(value: Any) -> Any:
         return value if abs(value) < 2**63 else hex(value)
     if isinstance(value, float):
         return value if math.isfinite(value) else repr(value)
-    return as_text(value)
+    return format_value(value)
 
 
-def _listed(items: Any) -> Any:
+def _as_list(items: Any) -> Any:
     if not isinstance(items, list):
         raise ValueError("must be a list of tables, each under its name in [[ ]]")
     return items
 
 
-def _named(name: Any) -> Any:
+def _check_name(name: Any) -> Any:
     if not isinstance(name, str):
         raise ValueError("must be the name of a result")
     return name
 
 
-_Tables = Annotated[list[Any], BeforeValidator(_listed)]
-_ResultName = Annotated[str, BeforeValidator(_named)]
+_Tables = Annotated[list[Any], BeforeValidator(_as_list)]
+_ResultName = Annotated[str, BeforeValidator(_check_name)]
 _Whole = Annotated[int, Field(ge=0)]
 
 
@@ -160,7 +162,7 @@ class CompareTable(StudyTable):
     weight: _ResultName | None = None
 
 
-def _several(limits: Any) -> Any:
+def _split_limits(limits: Any) -> Any:
     return limits if isinstance(limits, list) else [limits]
 
 
@@ -168,7 +170,9 @@ class FigureTable(FigureRecord):
     """A figure as a study file states it; `_KEYS_OF_FIGURES` has those of each kind."""
 
     kind: FigureKind = "axis"
-    limits: Annotated[list[float], BeforeValidator(_several)] = Field(default=[], alias="limit")
+    limits: Annotated[list[float], BeforeValidator(_split_limits)] = Field(
+        default=[], alias="limit"
+    )
 
 
 _KEYS_OF_FIGURES = {
@@ -237,7 +241,7 @@ class RequirementTable(StudyTable):
     cheaper: Literal["first", "last"] = "first"
 
     @model_validator(mode="after")
-    def _one_limit(self) -> Self:
+    def _check_one_limit(self) -> Self:
         if (self.most is None) == (self.least is None):
             raise ValueError("needs one limit: most = NUMBER, or least = NUMBER")
         return self

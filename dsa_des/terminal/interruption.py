@@ -63,7 +63,7 @@ def _say(what: str) -> None:
 
 
 @contextmanager
-def deferred() -> Iterator[None]:
+def defer_signals() -> Iterator[None]:
     """Let signals that ask for an end wait until the block is done.
 
     For the few steps that must not be done by halves: giving results their name, clearing up.

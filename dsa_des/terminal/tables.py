@@ -63,7 +63,7 @@ def print_table(
     short = [names[k] for k in kept]
     for name, some in together.items():
         note = (notes or {}).get(name, "")
-        _put(console)
+        _print(console)
         _put_folded(console, f"{name}: {printable(note)}" if note else name, "bold cyan")
         used = [k for k in range(len(short)) if any(row[k] for row in some)]
         shown = [[row[k] for k in used] for row in some]
@@ -85,7 +85,7 @@ def _print_rows(
     for row, note in zip_longest(cells, below, fillvalue=""):
         _print_line(console, row, layout, right)
         for line in fold(note, console.width - 4) if note else ():
-            _put(console, f"    {line}")
+            _print(console, f"    {line}")
 
 
 def _print_line(
@@ -95,17 +95,17 @@ def _print_line(
     folded = [fold(text, width) for text, width in zip(texts, widths, strict=True)]
     for number in range(max(map(len, folded), default=0)):
         parts = [
-            _padded(lines[number] if number < len(lines) else "", width, k in right)
+            _pad(lines[number] if number < len(lines) else "", width, k in right)
             for k, (lines, width) in enumerate(zip(folded, widths, strict=True))
         ]
-        _put(console, (" " * gap).join(parts).rstrip(), style)
+        _print(console, (" " * gap).join(parts).rstrip(), style)
 
 
 def _print_lists(console: Any, names: list[str], cells: list[list[str]]) -> None:
     """Print each row as a list, its empty values left out."""
     for number, row in enumerate(cells):
         if number:
-            _put(console)
+            _print(console)
         for name, cell in zip(names, row, strict=True):
             if cell:
                 _put_folded(console, f"{name}: {cell}")
@@ -113,10 +113,10 @@ def _print_lists(console: Any, names: list[str], cells: list[list[str]]) -> None
 
 def _put_folded(console: Any, text: str, style: str = "") -> None:
     for line in fold(text, console.width):
-        _put(console, line, style)
+        _print(console, line, style)
 
 
-def _put(console: Any, text: str = "", style: str = "") -> None:
+def _print(console: Any, text: str = "", style: str = "") -> None:
     from rich.text import Text
 
     console.print(Text(text, style=style), soft_wrap=True, highlight=False)
@@ -149,7 +149,7 @@ def _length(text: str) -> int:
     return cell_len(text)
 
 
-def _padded(text: str, width: int, right: bool) -> str:
+def _pad(text: str, width: int, right: bool) -> str:
     blanks = " " * (width - _length(text))
     return blanks + text if right else text + blanks
 

@@ -18,20 +18,20 @@ from dsa_des.text.safe_text import printable
 
 def say(line: object = "", *, err: bool = False) -> None:
     """Print one line, on standard error with `err`; what could break out of it is escaped."""
-    _put(printable(line), err)
+    _write(printable(line), err)
 
 
 def say_lines(text: str, *, err: bool = False) -> None:
     """Print text of several lines, whose parts were made printable before they were put in."""
-    _put(printable(text, lines=True), err)
+    _write(printable(text, lines=True), err)
 
 
 def say_json(value: Any) -> None:
     """Print a value as JSON; all that is not ASCII is an escape, numbers that are none are null."""
-    _put(json_text(value, indent=2, ensure_ascii=True), False)
+    _write(json_text(value, indent=2, ensure_ascii=True), False)
 
 
-def _put(text: str, err: bool) -> None:
+def _write(text: str, err: bool) -> None:
     stream = sys.stderr if err else sys.stdout
     encoding = getattr(stream, "encoding", None) or "utf-8"
     # A stream may know fewer letters than Unicode has.

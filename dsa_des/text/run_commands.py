@@ -21,7 +21,7 @@ def run_command(
     return shlex.join(words)
 
 
-def as_text(value: Any) -> str:
+def format_value(value: Any) -> str:
     """Return a value the way ``--set`` takes it."""
     if isinstance(value, Fraction):
         decimal = f"{float(value):.9f}".rstrip("0").rstrip(".")

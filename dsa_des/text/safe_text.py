@@ -30,7 +30,7 @@ def printable(text: object, *, lines: bool = False) -> str:
     )
 
 
-def shortened(text: object, most: int = MOST_OF_A_NAME) -> str:
+def shorten(text: object, most: int = MOST_OF_A_NAME) -> str:
     """Return printable text of at most `most` characters; an ellipsis stands for what is cut."""
     plain = _text_of(text)
     # What is cut away need not be escaped: one letter becomes one or more.
@@ -59,10 +59,10 @@ def _escape(letter: str) -> str:
 
 def shell_line(words: Iterable[str]) -> str:
     """Return words as a line that a shell reads back as the same words."""
-    return " ".join(map(_quoted, words))
+    return " ".join(map(_quote, words))
 
 
-def _quoted(word: str) -> str:
+def _quote(word: str) -> str:
     """Return a word as a shell reads it back; one that cannot be shown, with escapes."""
     if word.isprintable():
         return shlex.quote(word)

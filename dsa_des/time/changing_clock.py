@@ -45,7 +45,7 @@ class ChangingClock:
 
         for part, (start, new) in enumerate([(0, spec), *changes]):
             if part:
-                new = _going_on(spec, new, self._clocks[-1], start, ticks_per_s)
+                new = _continue_clock(spec, new, self._clocks[-1], start, ticks_per_s)
                 spec = changes[part - 1][1]
             clock = ScanClock(new, ticks_per_s, always_draws=always_draws)
             own = clock.first_scan_at_or_after(start)
@@ -99,7 +99,7 @@ class ChangingClock:
         return scans[inside], ticks[inside]
 
 
-def _going_on(
+def _continue_clock(
     old: ClockSpec, new: ClockSpec, clock: ScanClock, start: int, ticks_per_s: int
 ) -> ClockSpec:
     """Return the clock that another one becomes at a tick, with the offset of its grid."""

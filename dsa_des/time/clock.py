@@ -233,7 +233,7 @@ class ScanCursor:
             self.seek(tick + 1)
         return self.scan - 1, self.scan - 1 - first
 
-    def after(self, tick: int) -> int:
+    def next_scan_tick(self, tick: int) -> int:
         """Return the tick of the first scan after `tick`; the cursor stays."""
         if self.tick > tick:
             return self.tick

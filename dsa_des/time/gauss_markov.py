@@ -101,26 +101,30 @@ class GaussMarkov:
         instants = np.ascontiguousarray(instants_ns, dtype=np.int64)
         who = np.broadcast_to(np.asarray(targets, dtype=np.uint64), instants.shape)
         runs = np.broadcast_to(run, instants.shape)
-        return self._after(self._stream.branches, who, instants, process * _LEVELS, runs)
+        return self._values_after_branches(
+            self._stream.branches, who, instants, process * _LEVELS, runs
+        )
 
-    def _after(
+    def _values_after_branches(
         self, branches: int, who: Any, instants: IntArray, first: int, runs: IntArray
     ) -> FloatArray:
         """Return the values of runs that went on by the first so many of their branches."""
         if not branches:
-            return self._drawn_by(self._stream.of_runs(runs), who, instants, first)
+            return self._draw(self._stream.of_runs(runs), who, instants, first)
         begin = self._stream.of_branches(runs, branches)[0]
-        before = self._after(branches - 1, who, np.minimum(instants, begin), first, runs)
+        before = self._values_after_branches(
+            branches - 1, who, np.minimum(instants, begin), first, runs
+        )
         later = np.flatnonzero(instants > begin)
         if len(later):
             begin, stream = self._stream.of_branches(runs[later], branches)
             left = np.exp((begin - instants[later]) / self._tau_ns)
             ends = (instants[later], begin)
-            now, then = (self._drawn_by(stream, who[later], at, first) for at in ends)
+            now, then = (self._draw(stream, who[later], at, first) for at in ends)
             before[later] = left * before[later] + now - left * then
         return before
 
-    def _drawn_by(self, stream: Stream, who: Any, instants: IntArray, first: int) -> FloatArray:
+    def _draw(self, stream: Stream, who: Any, instants: IntArray, first: int) -> FloatArray:
         """Return the values that a stream draws."""
 
         def drawn(number: IntArray, level: int) -> tuple[FloatArray, FloatArray, FloatArray]:

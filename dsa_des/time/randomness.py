@@ -57,10 +57,10 @@ def philox4x32(
         ((k0 + np.uint64(first)) & _U_LOW, (k1 + np.uint64(second)) & _U_LOW)
         for first, second in _BUMPS
     ]
-    return _of_arrays((x0, x1, x2, x3), keys)
+    return _philox_of_arrays((x0, x1, x2, x3), keys)
 
 
-def _of_arrays(counter: Any, keys: Any) -> Any:
+def _philox_of_arrays(counter: Any, keys: Any) -> Any:
     x0, x1, x2, x3 = counter
     return _ten_rounds(x0, x1, x2, x3, keys, np.uint64(_M0), np.uint64(_M1), _U_LOW, _U32)
 
@@ -132,9 +132,9 @@ _NEVER_NS = 2**62
 class Stream:
     """The draws of one block for one purpose; use one purpose for one distribution only.
 
-    Of several runs, each with its own seed, `of_runs` tells the draws apart. `drew_for_all` says
-    whether something was drawn for all of them, with the seed of the first, and `shared` that this
-    is refused: who serves all runs draws for each.
+    Of several runs, each with its own seed, `of_runs` tells the draws apart. `has_drawn_for_all`
+    says whether something was drawn for all of them, with the seed of the first, and `shared` that
+    this is refused: who serves all runs draws for each.
 
     What is drawn once for a run, or said to be of no instant, stays what it is in all branches of
     it. `branches` is how many the runs have at most.
@@ -230,7 +230,7 @@ class Stream:
             target >> _U32,
         )
         keys = np.asarray(self._round_keys, dtype=np.uint64)
-        return _of_arrays(counter, keys)
+        return _philox_of_arrays(counter, keys)
 
     def _draw_for_all(self) -> None:
         self.drew_for_all = True
@@ -311,7 +311,7 @@ class Streams:
             self._made[block, purpose].shared = block in self._shared
         return self._made[block, purpose]
 
-    def drew_for_all(self, block: str) -> bool:
+    def has_drawn_for_all(self, block: str) -> bool:
         """Whether a block drew with the seed of the first of several runs."""
         return any(one.drew_for_all for (of, _), one in self._made.items() if of == block)
 

@@ -56,7 +56,7 @@ class RunClock:
         self._offsets = np.array([spec.offset_s * ticks_per_s for spec in specs], dtype=np.int64)
         self._alike_at_once = self._alike and bool((self._offsets == self._offsets[0]).all())
         self._going = range(0)  # those whose scans are kept in `_last` and `_read`
-        self._last: tuple[int, int, Scans] = (0, -1, (_NONE, RunTicks.none()))
+        self._last: tuple[int, int, Scans] = (0, -1, (_NONE, RunTicks.empty()))
         self._read = _NOTHING
         self._none = (0, -1)  # no scan from the first of these ticks on lies before the second
 
@@ -71,7 +71,7 @@ class RunClock:
             self._going, self._last, self._read = self._runs.going, (0, -1, self._last[2]), _NOTHING
         # Several blocks ask for the same scans of a window, one after the other.
         if self._last[:2] != (start, end):
-            self._last = start, end, self._between(start, min(end, self._runs.run_ticks))
+            self._last = start, end, self._scans_between(start, min(end, self._runs.run_ticks))
         return self._last[2]
 
     def none_before(self, tick: int) -> int:
@@ -93,12 +93,12 @@ class RunClock:
             ticks[run == one] = self._clocks[one].before(scans[run == one])
         return ticks
 
-    def _between(self, start: int, end: int) -> Scans:
+    def _scans_between(self, start: int, end: int) -> Scans:
         if self._runs.count == 1:
             scans, ticks = self._clocks[0].between(start, end)
             return scans, RunTicks.of_run(0, ticks)
         if self._alike:
-            return self._alike_between(start, end)
+            return self._scans_between_if_alike(start, end)
         if start < self._read[0] or end > self._read[1]:
             self._read_ahead(start, end)
         ticks, runs, numbers = self._read[2:]
@@ -116,13 +116,13 @@ class RunClock:
         order = np.argsort(ticks, kind="stable")
         self._read = start, until, ticks[order], runs[order], numbers[order]
 
-    def _alike_between(self, start: int, end: int) -> Scans:
+    def _scans_between_if_alike(self, start: int, end: int) -> Scans:
         clock, runs = self._clocks[0], np.array(self._going, dtype=np.int64)
         offsets = self._offsets[runs]
         earliest, latest = int(offsets.min()), int(offsets.max())
         scans, ticks = clock.between(start + clock.offset - latest, end + clock.offset - earliest)
         if not len(ticks):
-            return _NONE, RunTicks.none()
+            return _NONE, RunTicks.empty()
         later = offsets - clock.offset
         first, last = np.searchsorted(ticks, [start - later, end - later])
         counts = last - first

@@ -55,7 +55,7 @@ class Runs:
                 self.ended_by[run] = block
                 self.early = True
 
-    def before_ends(self, instants: RunTicks) -> BoolArray:
+    def is_before_ends(self, instants: RunTicks) -> BoolArray:
         """Return which instants lie before the ends of their runs."""
         return np.less(instants.tick, self.ends[instants.run])
 
@@ -63,6 +63,6 @@ class Runs:
         """Return how many of some runs are not known to end early."""
         return int(np.count_nonzero(self.ends[runs] == self.run_ticks))
 
-    def over(self, tick: int) -> bool:
+    def is_over(self, tick: int) -> bool:
         """Return whether all runs that go are over before a tick of theirs."""
         return self.early and bool((self.ends[self.going.start : self.going.stop] <= tick).all())

@@ -13,7 +13,7 @@ from scipy import stats
 
 from dsa_des.cli import main
 from dsa_des.commands import cost_answer
-from dsa_des.record.drawing import kept_figures
+from dsa_des.record.drawing import keep_figures
 
 STUDY = """
 title = "A head-on intruder, seen by a radar"
@@ -47,7 +47,7 @@ def study(tmp_path_factory):
 @pytest.fixture(scope="module")
 def made(study, tmp_path_factory):
     out = tmp_path_factory.mktemp("cost") / "out"
-    with kept_figures() as figures:
+    with keep_figures() as figures:
         done = call(
             "cost", study, "--answer", RANGE, "--answer", "declared.radar", "--block", "radar",
             "--vary", "blocks.radar.scan_rate_hz=[2, 5]",

@@ -69,7 +69,7 @@ def test_the_table_has_a_line_for_each_model(report: AnswerReport) -> None:
 
 
 def test_what_holds_for_all_is_said_once(report: AnswerReport) -> None:
-    said = report.about()
+    said = report.notes_on_tables()
     assert "each of the 5 is a paired difference" in said[0] and "at 99 % (Bonferroni)" in said[0]
     assert "median of 3 turns" in said[1]
     assert said[2:] == [
@@ -88,7 +88,7 @@ def test_a_page_says_what_the_command_says(report: AnswerReport) -> None:
     # and those with which no run differs in a line of its own.
     shown = [one for one in said if one not in page]
     assert [one.split()[0] for one in shown] == ["May", "The", "Within", "The", "Surely"]
-    assert first in page and all(sentence in page for sentence in report.about())
+    assert first in page and all(sentence in page for sentence in report.notes_on_tables())
     assert "| near | 0.5 | 5 | -5 to 15 | 60 of 60 | within, front |" in page
     assert head([report], [asked]) == (
         f"- **Ranges**, `range_m`. {' '.join(report.sentences('range_m')[1:3])}"

@@ -31,11 +31,11 @@ def test_what_is_kept_is_what_a_table_of_each_run_keeps(seed):
         if not len(runs):
             continue
         mine = [row for run in runs.tolist() for row in apart.get(run, [])]
-        assert rows_of(table.of(runs)) == mine
+        assert rows_of(table.rows_of_runs(runs)) == mine
         new = {run: [(run, k, int(dice.integers(99))) for k in range(dice.integers(4))]
                for run in runs.tolist()}  # fmt: skip
         rows = [row for run in runs.tolist() for row in new[run]]
-        table = table.after(runs, a_table(rows), first_run)
+        table = table.replace_runs(runs, a_table(rows), first_run)
         apart = {run: rows for run, rows in {**apart, **new}.items() if run >= first_run}
         kept = [row for row in rows_of(table) if row[0] >= first_run]
         assert kept == [row for run in sorted(apart) for row in apart[run]]
@@ -45,14 +45,14 @@ def test_what_is_kept_is_what_a_table_of_each_run_keeps(seed):
 
 def test_rows_of_a_run_are_continued_where_there_are_any_and_copied():
     old, new = a_table([(1, 5, 7), (3, 5, 8)]), a_table([(0, 0, 0), (1, 0, 0), (3, 0, 0)])
-    found = old.continued(new)
+    found = old.latest_or_new(new)
     assert rows_of(found) == [(0, 0, 0), (1, 5, 7), (3, 5, 8)]
     found.thing[:] = 9  # nobody else's
     assert old.thing.tolist() == [5, 5] and new.thing.tolist() == [0, 0, 0]
 
 
 def test_things_are_put_in_order_of_runs_and_keep_their_order_within():
-    assert rows_of(a_table([(2, 1, 0), (0, 9, 0), (2, 0, 0), (0, 1, 0)]).in_order()) == [
+    assert rows_of(a_table([(2, 1, 0), (0, 9, 0), (2, 0, 0), (0, 1, 0)]).sort()) == [
         (0, 9, 0), (0, 1, 0), (2, 1, 0), (2, 0, 0)]  # fmt: skip
 
 

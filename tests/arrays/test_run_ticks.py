@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from dsa_des.arrays.run_ticks import (
     RunTicks,
     first_of_run,
+    is_single_run,
     last_of_run,
     next_of_run,
-    no_runs,
     ranks,
-    says_no_runs,
+    runs_of_single,
     union,
 )
 
@@ -47,7 +47,7 @@ def test_the_first_at_or_after(known, asked, scale):
     assert rows.tolist() == [sum(one < pair for one in known) for pair in asked]
     of_run = first_of_run(instants, np.array([run for run, _ in asked], dtype=np.int64))
     assert of_run.tolist() == [sum(one[0] < run for one in known) for run, _ in asked]
-    assert [instants.before(run, tick * scale) for run, tick in asked] == rows.tolist()
+    assert [instants.count_before(run, tick * scale) for run, tick in asked] == rows.tolist()
 
 
 @settings(derandomize=True, deadline=None, max_examples=200)
@@ -86,14 +86,14 @@ def test_where_runs_begin_and_end(found):
     lasts = [max(k for k, (other, _) in enumerate(found) if other == run) for run in runs]
     assert instants.first_of_each.tolist() == firsts
     assert instants.last_of_each.tolist() == lasts
-    assert instants.one_run == (len(runs) <= 1)
+    assert instants.is_one_run == (len(runs) <= 1)
 
 
 @pytest.mark.parametrize("rows", [slice(1, 3), np.array([2, 0]), np.array([True, False, True])])
 def test_a_single_run_needs_no_column(rows):
     instants = RunTicks.of_run(0, np.array([4, 5, 9]))
-    assert says_no_runs(instants.run) and says_no_runs(instants.take(rows).run)
-    joined = RunTicks.joined([instants, instants])
-    assert says_no_runs(joined.run) and joined.run.tolist() == [0] * 6
-    assert not says_no_runs(RunTicks.of_run(2, np.array([4])).run)
-    assert no_runs(0).tolist() == []
+    assert is_single_run(instants.run) and is_single_run(instants.take(rows).run)
+    joined = RunTicks.concatenate([instants, instants])
+    assert is_single_run(joined.run) and joined.run.tolist() == [0] * 6
+    assert not is_single_run(RunTicks.of_run(2, np.array([4])).run)
+    assert runs_of_single(0).tolist() == []

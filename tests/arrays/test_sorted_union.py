@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run, no_runs, positions_among, union
+from dsa_des.arrays.run_ticks import RunTicks, last_of_run, positions_among, runs_of_single, union
 from dsa_des.arrays.sorted_union import sorted_union
 
 
@@ -34,7 +34,7 @@ def test_a_union_knows_its_parts_and_no_others(runs: int) -> None:
             run = np.sort(random.integers(0, runs, 40))
             tick = random.integers(0, 60, 40)
             order = np.lexsort((tick, run))
-            known = RunTicks(no_runs(40) if runs == 1 else run, tick[order])
+            known = RunTicks(runs_of_single(40) if runs == 1 else run, tick[order])
             parts.append(known)
         every = union(parts)
         pairs = list(zip(every.run.tolist(), every.tick.tolist(), strict=True))

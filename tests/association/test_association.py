@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from components.association.assignment import gate_threshold, global_nearest, nearest
-from components.association.jpda import exact, marginals, propagated
+from components.association.jpda import exact, marginals, propagate_beliefs
 
 
 def events(tracks, detections):
@@ -68,10 +68,10 @@ def test_many_clusters_together_are_each_decided_alone():
 def test_propagation_is_close_and_exact_where_nothing_is_shared():
     rng = np.random.default_rng(9)
     single = 10.0 ** rng.uniform(-1, 3, (1, 6))
-    np.testing.assert_allclose(propagated(single), exact(single), rtol=1e-9)
+    np.testing.assert_allclose(propagate_beliefs(single), exact(single), rtol=1e-9)
     for _ in range(20):
         weights = 10.0 ** rng.uniform(-1, 2, (4, 5)) * (rng.uniform(size=(4, 5)) < 0.5)
-        assert np.abs(propagated(weights) - enumerated(weights)).max() < 0.1
+        assert np.abs(propagate_beliefs(weights) - enumerated(weights)).max() < 0.1
 
 
 def best(tracks, detections, cost, missing):

@@ -6,7 +6,7 @@ import pytest
 from components.benchmark.track_updates import (
     LOOKS,
     _looks,
-    _started,
+    _start_tracks,
     by_stone_soup,
     listening,
     plain_looks,
@@ -21,7 +21,7 @@ def test_the_plain_loop_comes_to_the_states_of_our_tracker():
     scans, places = _looks(block)
     looks = plain_looks(scans, places, block.context.ticks_per_s)
     assert sorted({look.measured.shape[1] for look in looks}) == [2, 3] and len(looks) == LOOKS
-    first = _started(scans, places, block.p.start_speed_m_s)
+    first = _start_tracks(scans, places, block.p.start_speed_m_s)
     states, covariances = track_plainly(
         looks[1:], *first, block.p.acceleration_intensity_m2_s3, looks[0].time_s
     )

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from components.benchmark.pairs import PAIRS, measured
+from components.benchmark.pairs import PAIRS, measure_pairs
 from components.benchmark.rates import RATES
-from components.benchmark.rates import measured as measured_rate
+from components.benchmark.rates import measure_rate as measured_rate
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -44,7 +44,7 @@ def test_the_three_sensors_share_one_processor_that_keeps_up():
 
 @pytest.mark.parametrize("pair", PAIRS, ids=lambda pair: pair.name)
 def test_a_pair_is_measured(pair):
-    row = measured(pair.name, quick=True, repeats=1)
+    row = measure_pairs(pair.name, quick=True, repeats=1)
     low, high = row["times_quartiles"]
     assert 0.0 < low <= row["times"] <= high
     assert row["wanted"] == pair.wanted

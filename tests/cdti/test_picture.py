@@ -20,7 +20,7 @@ from components.cdti.contacts import (
     contacts_of_lines,
     contacts_of_states,
 )
-from components.cdti.loss_area import lost_area
+from components.cdti.loss_area import predicted_loss_area
 from components.cdti.scope import Scope
 from components.messages.state_tracks import StateTracks
 from components.messages.tracks import Tracks
@@ -129,7 +129,9 @@ def test_a_contact_dead_ahead_is_on_the_nose_however_far_the_start_is(ranged):
         down_m_s=one, origin_lat_deg=60.0 * one, origin_lon_deg=10.0 * one,
         origin_alt_m=1000.0 * one,
     )  # fmt: skip
-    ((_, east, north, up, bearing, _),) = contacts_of_states(message, own, 1).shown(own.now, 2, 9)
+    ((_, east, north, up, bearing, _),) = contacts_of_states(message, own, 1).rows_to_show(
+        own.now, 2, 9
+    )
     assert bearing == pytest.approx(math.degrees(nose), abs=0.02)
     if ranged:
         assert math.degrees(math.atan2(east, north)) == pytest.approx(math.degrees(nose), abs=0.02)
@@ -147,7 +149,7 @@ def test_the_area_of_a_loss_is_that_of_flights_tried_one_by_one():
     own = np.array([-30.0, -40.0, 0.5])
     relative = np.array([[-2600.0, 2500.0], [-1500.0, 900.0], [60.0, -90.0],
                          [80.0, -70.0], [45.0, -20.0], [0.5, 1.5]])  # fmt: skip
-    found = lost_area(volume, 1000.0, own, relative, 120.0)
+    found = predicted_loss_area(volume, 1000.0, own, relative, 120.0)
     step_s = 0.25
     times = np.arange(0.0, 120.0, step_s)
     lost = {}

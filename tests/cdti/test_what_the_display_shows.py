@@ -156,9 +156,13 @@ def test_what_was_heard_by_an_instant_is_shown_whatever_comes_later(shown):
 def test_the_display_says_where_a_command_leads_and_of_which_alert_a_contact_is(shown):
     scope, recorded, contact = shown
     own = scope.picture(DURATION_S)["own"]
-    assert scope.led_to("turn", -60.0) == pytest.approx((own["heading"] - 60.0) % 360.0, abs=0.06)
-    assert scope.led_to("turn", 150.0) == pytest.approx((own["heading"] + 150.0) % 360.0, abs=0.06)
-    assert scope.led_to("climb", -150.0) == pytest.approx(own["alt"] - 150.0, abs=0.11)
+    assert scope.commanded_value("turn", -60.0) == pytest.approx(
+        (own["heading"] - 60.0) % 360.0, abs=0.06
+    )
+    assert scope.commanded_value("turn", 150.0) == pytest.approx(
+        (own["heading"] + 150.0) % 360.0, abs=0.06
+    )
+    assert scope.commanded_value("climb", -150.0) == pytest.approx(own["alt"] - 150.0, abs=0.11)
     last = {r["target"]: r["level"] for r in recorded["alerts"] if r["time_s"] == 8.0}
     assert {name: scope.level_of(contact[name]) for name in TARGETS} == last
     assert scope.level_of(77) == 0

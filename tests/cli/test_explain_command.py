@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.registry import find
 from dsa_des.cli import main
 from dsa_des.commands.scene import measured_shares
@@ -90,7 +90,7 @@ def test_what_everything_leaves_out_is_listed_with_its_reason() -> None:
 def test_every_effect_that_is_not_neutral_says_why() -> None:
     silent = [
         effect.name
-        for type_name in registered()
+        for type_name in entry_points_of()
         for effect in find(type_name).effects
         if not effect.neutral and not effect.outside_the_proof
     ]

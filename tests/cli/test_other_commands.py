@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.cli import main
 
 CONFIGS = Path(__file__).parent.parent.parent / "configs"
@@ -70,14 +70,14 @@ def test_graph_refuses_two_forms() -> None:
 
 def test_components_lists_every_registered_type() -> None:
     output = call("components").stdout
-    assert all(name in output for name in registered())
+    assert all(name in output for name in entry_points_of())
     assert "cannot be loaded" not in output
 
 
-@pytest.mark.parametrize("name", sorted(registered()))
+@pytest.mark.parametrize("name", sorted(entry_points_of()))
 def test_components_describes_ports_and_parameters(name: str) -> None:
     output = call("components", name).stdout
-    cls = registered()[name].load()
+    cls = entry_points_of()[name].load()
     for port in [*cls.inputs, *cls.outputs, *cls.Parameters.model_fields]:
         assert port in output
     undocumented = [f for f, i in cls.Parameters.model_fields.items() if not i.description]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from dsa_des.block.foreign import NotImportable, load_named, refuse_hidden
+from dsa_des.block.foreign import NotImportable, load_named, refuse_hidden_module
 from dsa_des.cli import main
 from dsa_des.errors import UsageError
 from tests import warm_process
@@ -234,9 +234,9 @@ def test_python_m_looks_into_the_working_directory_last(tmp_path: Path) -> None:
 
 
 def test_ours_is_not_hidden_and_others_are_no_matter(monkeypatch: pytest.MonkeyPatch) -> None:
-    refuse_hidden("components.gate")
-    refuse_hidden("there_is_none_such.at_all")
-    refuse_hidden("json.decoder")
+    refuse_hidden_module("components.gate")
+    refuse_hidden_module("there_is_none_such.at_all")
+    refuse_hidden_module("json.decoder")
     monkeypatch.setitem(sys.modules, "components", sys.modules["json"])
     with pytest.raises(UsageError, match="json"):
-        refuse_hidden("components.gate")
+        refuse_hidden_module("components.gate")

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.terminal.safe_console import SafeConsole
-from dsa_des.text.safe_text import printable, shortened
+from dsa_des.text.safe_text import printable, shorten
 
 HOSTILE = "\x1b[31m\x07\x08\r\n\t\x7f\x85\x9b\u200b\u2028\u202e\u2066\ud800\U000e0001"
 ANY_TEXT = st.text(st.characters())
@@ -41,7 +41,7 @@ def test_what_is_plain_is_left_alone(text: str) -> None:
 
 @given(ANY_TEXT, st.integers(2, 40))
 def test_shortened_text_is_short_and_says_so(text: str, most: int) -> None:
-    shown = shortened(text, most)
+    shown = shorten(text, most)
     assert len(shown) <= most
     assert shown == printable(text) or shown.endswith("…")
 

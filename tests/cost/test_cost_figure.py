@@ -11,7 +11,7 @@ from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.costs.climb import Comparison, RungCost
 from dsa_des.costs.output import _cells, draw_costs, put_labels
 from dsa_des.costs.replay import Spread
-from dsa_des.record.drawing import kept_figures
+from dsa_des.record.drawing import keep_figures
 
 
 def test_labels_cover_neither_each_other_nor_a_point():
@@ -49,7 +49,7 @@ def _costs(block: str) -> list[RungCost]:
 @pytest.mark.parametrize("panels", [1, 2])
 def test_the_title_is_whole_and_off_the_panels(panels, tmp_path):
     costs = [cost for panel in range(panels) for cost in _costs(f"block_{panel}")]
-    with kept_figures() as kept:
+    with keep_figures() as kept:
         draw_costs(tmp_path / "cost.png", "A lookout who sees another aircraft", costs)
     figure = kept["cost"]
     renderer = FigureCanvasAgg(figure).get_renderer()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from components.aircraft.known_targets import known_targets
-from components.optical.area_of_cells import body_mesh, sampled_table
+from components.optical.area_of_cells import body_mesh, silhouette_table_of_bodies
 from components.optical.sensors import fuselage_length_m
 from components.optical.silhouette import union_area, visible_area
 from dsa_des.record.recording import Recorder
@@ -72,7 +72,7 @@ def union(view, back=None):
 @pytest.mark.parametrize("back", [None, 24.0])
 def test_a_sampled_table_is_the_union_at_its_nodes_and_near_it_between(back):
     view = random_views()
-    table = sampled_table(*AREAS, back)
+    table = silhouette_table_of_bodies(*AREAS, back)
     by_table = visible_area(*view, model="aspect_table", table=table)
     assert np.abs(by_table - union(view, back)).max() < 0.03 * sum(AREAS)
     nodes = (np.radians(180.0 - np.arange(0.0, 360.0, 30.0)), *np.zeros((2, 12)),

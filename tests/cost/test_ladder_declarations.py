@@ -3,16 +3,16 @@
 import pytest
 from click.testing import CliRunner
 
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.registry import find
 from dsa_des.cli import main
-from dsa_des.costs.climb import on_front, parse_budgets
+from dsa_des.costs.climb import is_on_front, parse_budgets
 from dsa_des.errors import UsageError
 
 LADDERS = [
     pytest.param(name, ladder, id=f"{name}-{ladder.name}")
-    for name in registered()
+    for name in entry_points_of()
     for ladder in find(name).ladders
 ]
 
@@ -33,9 +33,9 @@ def test_rungs_fill_the_same_contract(type_name, ladder):
 
 
 def test_every_sensor_transform_and_fusion_has_a_ladder():
-    without = {name for name in registered() if not find(name).ladders}
+    without = {name for name in entry_points_of() if not find(name).ladders}
     without -= {"fusion.pass_through"}  # puts nothing together: there is nothing to be exact about
-    assert without.isdisjoint({name for name in registered() if name.split(".")[0] in (
+    assert without.isdisjoint({name for name in entry_points_of() if name.split(".")[0] in (
         "radar", "optical", "geometry", "fusion")})  # fmt: skip
 
 
@@ -56,11 +56,11 @@ def test_a_ladder_says_what_is_wrong_with_it():
 
 def test_the_front_holds_what_nothing_beats():
     points = [(1, 5), (2, 5), (2, 3), (3, 3), (4, 0), (5, float("nan")), (1, 5)]
-    assert on_front(points) == [True, False, True, False, True, False, True]
+    assert is_on_front(points) == [True, False, True, False, True, False, True]
 
 
 def test_budgets_are_numbers_with_a_unit_of_the_ladders():
-    ladders = [ladder for name in registered() for ladder in find(name).ladders]
+    ladders = [ladder for name in entry_points_of() for ladder in find(name).ladders]
     assert parse_budgets(["0.5mrad", "2 m", "1e-3pd", "1m2"], ladders) == {
         "mrad": 0.5, "m": 2.0, "Pd": 1e-3, "m²": 1.0}  # fmt: skip
     for wrong in ("mrad", "0mrad", "-1m", "1.2.3m", "1furlong", "nan m"):

@@ -204,7 +204,7 @@ def test_the_close_up_prefers_the_largest_combination(tmp_path):
 
 def test_without_flights_there_is_still_a_timeline(tmp_path, monkeypatch):
     simulation, folder, summary = run(tmp_path, a_target("solo"), 10)
-    monkeypatch.setattr(Flights, "of", classmethod(lambda cls, *_: None))
+    monkeypatch.setattr(Flights, "from_simulation", classmethod(lambda cls, *_: None))
     assert [path.name for path in draw(simulation, folder, summary)] == ["timeline.png"]
 
 

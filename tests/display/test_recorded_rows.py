@@ -17,7 +17,7 @@ from components.display.recorded_rows import (
     read_scans,
     scans_between,
     strides,
-    thinned,
+    thin_rows,
 )
 from components.display.summary import FusedSummary, SensorSummary
 from dsa_des.block.message import Text
@@ -31,7 +31,7 @@ def kept(rows, pieces, most):
     numbers = {one: number for number, one in enumerate(dict.fromkeys(rows))}
     series = np.array([numbers[one] for one in rows], dtype=np.int64)
     cuts = list(itertools.pairwise([0, *sorted(pieces), len(rows)]))
-    found, (where,) = thinned(lambda: [(series[a:b], place[a:b]) for a, b in cuts], most, 1)
+    found, (where,) = thin_rows(lambda: [(series[a:b], place[a:b]) for a, b in cuts], most, 1)
     assert np.all(np.diff(where) > 0)
     assert [numbers[rows[int(i)]] for i in where] == found.tolist()
     return where.astype(int).tolist()

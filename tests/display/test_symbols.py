@@ -16,7 +16,7 @@ from components.display.symbols import (
     draw_density,
     draw_lines,
     evenly,
-    staggered,
+    stagger_marks,
     styles_of,
     targets_key,
 )
@@ -109,22 +109,22 @@ def test_where_all_is_covered_the_least_covered_place_is_taken():
 
 def test_marks_keep_their_distance_and_the_first_one():
     along = np.linspace(0.0, 100.0, 1001)
-    kept = staggered(along, 10.0, 0.0)
+    kept = stagger_marks(along, 10.0, 0.0)
     assert kept[0] == 0
     assert np.allclose(np.diff(along[kept]), 10.0)
 
 
 def test_two_sensors_take_turns():
     along = np.linspace(0.0, 100.0, 1001)
-    one, other = (along[staggered(along, 10.0, phase)[1:]] for phase in (0.0, 0.5))
+    one, other = (along[stagger_marks(along, 10.0, phase)[1:]] for phase in (0.0, 0.5))
     assert np.abs(one[:, None] - other).min() >= 4.9
 
 
 def test_gaps_stay_gaps_and_unknown_places_are_left_out():
     along = np.array([np.nan, 0.0, 1.0, 80.0, 81.0, np.nan])
-    assert staggered(along, 10.0, 0.0).tolist() == [1, 3]
-    assert staggered(np.full(3, np.nan), 10.0, 0.0).tolist() == []
-    assert staggered(np.zeros(5), 10.0, 0.3).tolist() == [0]
+    assert stagger_marks(along, 10.0, 0.0).tolist() == [1, 3]
+    assert stagger_marks(np.full(3, np.nan), 10.0, 0.0).tolist() == []
+    assert stagger_marks(np.zeros(5), 10.0, 0.3).tolist() == [0]
 
 
 def test_evenly_keeps_both_ends():

@@ -2,12 +2,12 @@
 
 from click.testing import CliRunner
 
-from components.benchmark.calls import measured
+from components.benchmark.calls import measure_calls
 from dsa_des.cli import main
 
 
 def test_every_call_is_timed():
-    row = measured(calls=12, repeats=2)
+    row = measure_calls(calls=12, repeats=2)
     assert row["calls"] == 24
     assert row["sightings"] > 0 and row["sightings"] % 2 == 0  # the same in each repetition
     assert row["undisturbed_us"]["p99"] <= row["wall_us"]["p99"]

@@ -10,7 +10,7 @@ from geographiclib.geodesic import Geodesic
 
 import dsa_des
 from components.encounters.encounter_traffic import encounter_flights
-from components.encounters.made_encounters import made_set, read_recipe
+from components.encounters.made_encounters import make_set, read_recipe
 from components.formats.encounter_set import EncounterSet
 from components.formats.set_file import read_set
 from dsa_des.errors import UsageError
@@ -36,7 +36,7 @@ at = [-41.3, 179.9997]
 def made(folder: Path, text: str = RECIPE) -> EncounterSet:
     path = folder / "made.toml"
     path.write_text(text, encoding="utf-8")
-    return made_set(read_recipe(str(path)))
+    return make_set(read_recipe(str(path)))
 
 
 def changed(old: str, new: str) -> str:

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import dsa_des
-from components.encounters.splitting import drawn_copies, expected_copies, nearness, split_set
+from components.encounters.splitting import draw_copies, expected_copies, nearness, split_set
 from components.formats.set_file import read_set
 from components.metrics.risk import risk_ratio
 from tests.encounters.test_set_file import call
@@ -29,13 +29,13 @@ def test_copies_by_hand() -> None:
 
 def test_the_expected_number_is_that_and_an_encounter_s_own() -> None:
     numbers, expected = np.arange(40_000), np.tile([0.3, 1.0, 2.75, 3.0], 10_000)
-    many = drawn_copies(numbers, expected, 5)
+    many = draw_copies(numbers, expected, 5)
     for k, r in enumerate((0.3, 1.0, 2.75, 3.0)):
         error = np.sqrt(max((r % 1) * (1 - r % 1), 0.0) / 10_000)
         assert abs(many[k::4].mean() - r) <= 4 * error
     # A function of number and seed: others in the batch change nothing.
-    assert (drawn_copies(numbers[7:9], expected[7:9], 5) == many[7:9]).all()
-    assert (drawn_copies(numbers, expected, 6) != many).any()
+    assert (draw_copies(numbers[7:9], expected[7:9], 5) == many[7:9]).all()
+    assert (draw_copies(numbers, expected, 6) != many).any()
 
 
 def airspace(random, count):
@@ -57,7 +57,7 @@ def test_split_sets_agree_with_plain_ones_and_know_how_wrong_they_are() -> None:
     for seed in range(rounds):
         score, w, n, fails = airspace(random, 1500)
         expected = expected_copies(score, np.array([4.0]), np.array([0.15, 2.5]))
-        many = drawn_copies(np.arange(1500), expected, seed)
+        many = draw_copies(np.arange(1500), expected, seed)
         place = np.repeat(np.arange(1500), many)
         m = random.random(len(place)) < fails[place]  # each copy has random numbers of its own
         found = risk_ratio(n[place], m, (w / expected)[place], cluster=place)

@@ -9,9 +9,9 @@ import pytest
 from components.association.jpda import exact, marginals
 from components.estimation.estimator import (
     Estimates,
-    combined,
     innovation_squared,
     log_mixture,
+    mixture_moments,
     pair_measurement,
 )
 from components.estimation.frame import SensorPose
@@ -94,7 +94,7 @@ def test_interacting_filters(kind):
     after = estimator.update(ahead, every, said, every)
     nis = innovation_squared(said, ahead[2], every)
     mixture = log_mixture(ahead[2], said.log_likelihoods)
-    whole = combined(after)
+    whole = mixture_moments(after)
     fresh = [0.0, (4.0 * DEGREE) ** 2, 4.0]
     q = [(0.7, 0.0), (0.3, 0.8 * DEGREE**2), (0.4, 0.0)]
     for n in range(COUNT):

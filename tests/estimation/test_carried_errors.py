@@ -21,7 +21,7 @@ from components.estimation.carried_errors import (
 from components.estimation.estimator import Estimates, ExtendedKalmanFilter, pair_measurement
 from components.estimation.frame import pose_in_frame
 from components.estimation.interacting_models import InteractingMultipleModels
-from components.estimation.kalman import linear_moments, updated
+from components.estimation.kalman import linear_moments, update
 from components.estimation.measurement import Kind
 from components.estimation.motion import ConstantVelocity, CoordinatedTurn, predict
 from components.estimation.unscented import SigmaPoints, UnscentedKalmanFilter
@@ -58,12 +58,14 @@ def test_derivatives_are_those_of_differences(at_range):
         rng.normal(0.0, 400.0, (1, count)),
         rng.normal(0.0, 60.0, (3, count)), rng.normal(size=(len(WAYS) + 1, count)),
     ])  # fmt: skip
-    seen, slope = errors.linearised(kind, state, place)
-    np.testing.assert_array_equal(seen, errors.expected(kind, state, place))
+    seen, slope = errors.linearise(kind, state, place)
+    np.testing.assert_array_equal(seen, errors.expected_measurement(kind, state, place))
     for i, step in enumerate([1e-2] * 6 + [1e-4] * (len(WAYS) + 1)):
         off = np.zeros_like(state)
         off[i] = step
-        both = [errors.expected(kind, state + sign * off, place) for sign in (1.0, -1.0)]
+        both = [
+            errors.expected_measurement(kind, state + sign * off, place) for sign in (1.0, -1.0)
+        ]
         apart = (both[0] - both[1]) / (2.0 * step)
         size = np.maximum(np.abs(slope[:, i]).max(axis=1, keepdims=True), 1e-6)
         least = np.array([1e-9, 1e-9, 1e-5, 1e-5, 1e-5, 1e-5])[:, np.newaxis]
@@ -82,8 +84,8 @@ def test_heights_at_ranges_and_without_stand_beside_each_other():
     mixed = replace(
         both[0], at_range=at_range, deviation=np.where(at_range, *(b.deviation for b in both[::-1]))
     )
-    alone = [each.linearised(kind, state, place) for each in both]
-    for part, found in enumerate(mixed.linearised(kind, state, place)):
+    alone = [each.linearise(kind, state, place) for each in both]
+    for part, found in enumerate(mixed.linearise(kind, state, place)):
         expected = np.where(at_range, alone[1][part], alone[0][part])
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
@@ -97,9 +99,9 @@ def test_a_height_at_a_range_moves_on_a_sphere_and_a_bearing_about_the_vertical(
         moved[6 + WAYS.index(way)] = 2.0
         errors = told(1, True)
         if says == 2:  # the range
-            seen = [errors.expected(kind, x, place)[2, 0] for x in (state, moved)]
+            seen = [errors.expected_measurement(kind, x, place)[2, 0] for x in (state, moved)]
         else:
-            seen = [errors._displaced(x, place)[0][2, 0] for x in (state, moved)]
+            seen = [errors._reported_states(x, place)[0][2, 0] for x in (state, moved)]
         assert seen[0] == pytest.approx(seen[1], abs=1e-6)
 
 
@@ -112,18 +114,18 @@ def test_a_late_position_lies_back_along_the_flight_and_reports_do_not_tell_how_
     state = np.zeros((8, 1))
     state[:6, 0] = [4000.0, 3000.0, -2600.0, 80.0, 0.0, 0.0]
     state[7] = 1.0
-    seen = late.expected(kind, state, place)
+    seen = late.expected_measurement(kind, state, place)
     state[0] -= 40.0
     state[7] = 0.0
-    np.testing.assert_allclose(seen, late.expected(kind, state, place), rtol=1e-12)
+    np.testing.assert_allclose(seen, late.expected_measurement(kind, state, place), rtol=1e-12)
 
     root = np.random.default_rng(5).normal(size=(8, 8))
     covariance = (root @ root.T * 9.0 + np.diag([900.0] * 3 + [9.0] * 3 + [1.0] * 2))[..., None]
-    moments = linear_moments(*late.linearised(kind, state, place), covariance)
-    moments = replace(moments, considered=late.considered)
+    moments = linear_moments(*late.linearise(kind, state, place), covariance)
+    moments = replace(moments, considered=late.considered_components)
     variance = np.array([1e-6, 1e-6, 25.0, 1.0, 1.0, 1.0])[:, None]
     measured = np.array([0.01, -0.004, 30.0, 2.0, -1.0, 0.5])[:, None]
-    moved, spread = updated(state, covariance, moments.innovation(variance), measured)
+    moved, spread = update(state, covariance, moments.innovation(variance), measured)
     p, h = covariance[..., 0], moments.jacobian[..., 0]
     gain = p @ h.T @ np.linalg.inv(h @ p @ h.T + np.diag(variance[:, 0]))
     gain[7] = 0.0
@@ -224,7 +226,7 @@ def test_tracks_are_those_of_one_batch_that_knows_how_errors_are_correlated(name
     plain = ReportedErrors(WAYS, 0.0 * errors.deviation, errors.age_s, errors.at_range)
     for k in range(COUNT):
         still[:6, 0] = told_states[6 * k : 6 * k + 6]
-        looks.append(plain.expected(kind, still, place)[:, 0])
+        looks.append(plain.expected_measurement(kind, still, place)[:, 0])
     level = np.cos(looks[0][1])
     white[:3, 0] = 4.0 / (far * level) ** 2, 4.0 / far**2, 4.0
     tracks = tracked(estimator, looks, place, errors, white)

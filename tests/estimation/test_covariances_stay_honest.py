@@ -6,8 +6,8 @@ from scipy.stats import chi2
 
 from components.estimation.batched import cholesky, distance_squared, solve_lower
 from components.estimation.frame import SensorPose
-from components.estimation.kalman import innovation, updated
-from components.estimation.measurement import Kind, expected, linearised, residual
+from components.estimation.kalman import innovation, update
+from components.estimation.measurement import Kind, expected_measurement, linearise, residual
 from components.estimation.motion import ConstantVelocity, predict
 from components.estimation.unscented import SigmaPoints, predict_unscented, unscented_moments
 
@@ -21,7 +21,7 @@ def level_place(count):
 def step(name, model, state, covariance, dt, kind, place, variance):
     if name == "ekf":
         state, covariance = predict(model, state, covariance, dt)
-        return state, covariance, innovation(*linearised(kind, state, place), covariance, variance)
+        return state, covariance, innovation(*linearise(kind, state, place), covariance, variance)
     state, covariance = predict_unscented(model, state, covariance, dt, SIGMA)
     return (
         state, covariance,
@@ -51,7 +51,7 @@ def test_a_million_updates_keep_covariances_symmetric_and_positive(name):
         errors = variance[: kind.size]
         state, covariance, found = step(name, model, state, covariance, late, kind, place, errors)
         moved = found.expected + rng.normal(size=errors.shape) * np.sqrt(errors)
-        state, covariance = updated(state, covariance, found, residual(moved, found.expected))
+        state, covariance = update(state, covariance, found, residual(moved, found.expected))
     np.testing.assert_array_equal(covariance, covariance.swapaxes(0, 1))
     deviation = np.sqrt(np.einsum("iin->in", covariance))
     scaled = (covariance / deviation / deviation[:, np.newaxis]).transpose(2, 0, 1)
@@ -76,11 +76,13 @@ def test_normalised_errors_of_far_targets_have_the_mean_of_chi_square():
         root = np.linalg.cholesky(model.noise(dt).transpose(2, 0, 1))
         truth = model.move(truth, dt)
         truth += np.einsum("nij,jn->in", root, rng.normal(size=(6, count)))
-        seen = expected(kind, truth, place) + rng.normal(size=(3, count)) * np.sqrt(variance)
+        seen = expected_measurement(kind, truth, place) + rng.normal(size=(3, count)) * np.sqrt(
+            variance
+        )
         state, covariance, found = step("ekf", model, state, covariance, dt, kind, place, variance)
         apart = residual(seen, found.expected)
         nis.append(distance_squared(found.root, apart))
-        state, covariance = updated(state, covariance, found, apart)
+        state, covariance = update(state, covariance, found, apart)
     error = (truth - state).T
     nees = np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance.transpose(2, 0, 1)), error)
     for values, freedom in ((nees, 6), (np.concatenate(nis), 3)):
@@ -102,7 +104,7 @@ def test_a_track_is_the_same_to_the_bit_alone_or_among_others(name):
         found = step(name, model, state[:, which], covariance[:, :, which], dt[which], kind,
                      place.take(which), variance[:, which])  # fmt: skip
         measured = found[2].expected + 0.001
-        return updated(found[0], found[1], found[2], residual(measured, found[2].expected))
+        return update(found[0], found[1], found[2], residual(measured, found[2].expected))
 
     together = run(np.arange(count))
     for which in (np.array([0]), np.array([66]), np.array([13, 14, 15]), np.arange(5, 38)):

@@ -10,14 +10,14 @@ import pymap3d
 import pytest
 from scipy.linalg import expm
 
-from components.estimation.estimator import reweighted
+from components.estimation.estimator import update_model_probabilities
 from components.estimation.frame import SensorPose, pose_in_frame
-from components.estimation.interacting_models import mixed, transition_probabilities
-from components.estimation.kalman import innovation, updated
+from components.estimation.interacting_models import mix_models, transition_probabilities
+from components.estimation.kalman import innovation, update
 from components.estimation.measurement import (
     Kind,
-    expected,
-    linearised,
+    expected_measurement,
+    linearise,
     position_of,
     residual,
 )
@@ -49,11 +49,11 @@ def test_every_update_agrees_with_stone_soup(name):
         dt = np.array([time_s - last_s])
         if name == "ekf":
             state, covariance = predict(model, state, covariance, dt)
-            found = innovation(*linearised(kind, state, place), covariance, variance)
+            found = innovation(*linearise(kind, state, place), covariance, variance)
         else:
             state, covariance = predict_unscented(model, state, covariance, dt, sigma)
             found = unscented_moments(kind, state, covariance, place, sigma).innovation(variance)
-        state, covariance = updated(state, covariance, found, residual(values, found.expected))
+        state, covariance = update(state, covariance, found, residual(values, found.expected))
         last_s = time_s
         np.testing.assert_allclose(state[:, 0], np.array(known["state"]) * FLIP, rtol=1e-10)
         expected_covariance = np.array(known["covariance"]) * np.outer(FLIP, FLIP)
@@ -82,7 +82,9 @@ def test_places_in_the_frame_are_those_of_ecef_and_rotation_matrices():
     )
     target = crooked.position(crooked.ROLLING)
     in_frame = np.array(pymap3d.ecef2ned(*target, *origin))
-    seen = expected(Kind(), np.concatenate([in_frame, np.zeros(3)])[:, np.newaxis], place)[:, 0]
+    seen = expected_measurement(
+        Kind(), np.concatenate([in_frame, np.zeros(3)])[:, np.newaxis], place
+    )[:, 0]
     body = crooked.body(crooked.ROLLING)
     np.testing.assert_allclose(seen[:2], crooked.angles(body), atol=1e-9)
     assert seen[2] == pytest.approx(np.linalg.norm(body), abs=1e-5)
@@ -105,7 +107,7 @@ def test_derivatives_of_measurements_are_exact():
         return [mpmath.atan2(y, x), mpmath.asin(-z / r), r, rate]
 
     kind = Kind(True, True)
-    value, jacobian = linearised(kind, state[:, np.newaxis], place)
+    value, jacobian = linearise(kind, state[:, np.newaxis], place)
     with mpmath.workdps(30):
         np.testing.assert_allclose(value[:, 0], [float(v) for v in seen(*state)], rtol=1e-12)
         known = np.zeros((4, 6))
@@ -187,7 +189,7 @@ def test_interacting_models_follow_the_textbook(fresh):
         got = transition_probabilities(rates, np.array([0.0, dt]))
         np.testing.assert_allclose(got[:, :, 1], steps, rtol=1e-12)
         np.testing.assert_allclose(got[:, :, 0], np.eye(3), atol=1e-15)
-        new_states, new_covariances, predicted = mixed(
+        new_states, new_covariances, predicted = mix_models(
             [s[:, np.newaxis] for s in states],
             [c[:, :, np.newaxis] for c in covariances],
             probabilities[:, np.newaxis],
@@ -219,6 +221,7 @@ def test_interacting_models_follow_the_textbook(fresh):
     logs = np.array([[-1.0], [-3.0], [-900.0]])
     weights = probabilities * np.exp(logs[:, 0])
     np.testing.assert_allclose(
-        reweighted(probabilities[:, np.newaxis], logs)[:, 0], weights / weights.sum(),
+        update_model_probabilities(probabilities[:, np.newaxis], logs)[:, 0],
+        weights / weights.sum(),
         atol=1e-300,
     )  # fmt: skip

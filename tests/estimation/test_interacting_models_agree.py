@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from components.estimation.estimator import (
     Estimates,
     ExtendedKalmanFilter,
-    combined,
+    mixture_moments,
     pair_measurement,
 )
 from components.estimation.frame import SensorPose
@@ -53,7 +53,7 @@ def test_every_update_of_three_models_agrees_with_40_digits():
         for m in range(3):
             np.testing.assert_allclose(states[m][:, 0], known["states"][m], rtol=1e-9)
             assert apart(covariances[m][:, :, 0], np.array(known["covariances"][m])) < 1e-9
-        mean, spread = combined(after)
+        mean, spread = mixture_moments(after)
         np.testing.assert_allclose(mean[:, 0], known["state"], rtol=1e-9)
         assert apart(spread[:, :, 0], np.array(known["covariance"])) < 1e-9
 
@@ -64,7 +64,7 @@ def test_which_model_it_was_is_what_bayes_says_of_two_unlike_times():
     models = [ExtendedKalmanFilter(ConstantVelocity(q)) for q in (1.0, 2.0, 3.0)]
     imm = InteractingMultipleModels(tuple(models), rates)
     until_s, since_s = np.array([0.5, 4.0]), np.array([3.0, 0.2])
-    found = imm.models_then(np.stack([weights, weights], axis=1), until_s, since_s)
+    found = imm.past_model_probabilities(np.stack([weights, weights], axis=1), until_s, since_s)
     for k in range(2):
         joint = (weights @ expm(generator * until_s[k]))[:, None] * expm(generator * since_s[k])
         np.testing.assert_allclose(found[..., k], joint / joint.sum(axis=0), rtol=1e-12)

@@ -5,8 +5,8 @@ from scipy.optimize import least_squares
 
 from components.estimation.frame import SensorPose
 from components.estimation.iterated import iterate
-from components.estimation.kalman import innovation, updated
-from components.estimation.measurement import Kind, expected, linearised, residual
+from components.estimation.kalman import innovation, update
+from components.estimation.measurement import Kind, expected_measurement, linearise, residual
 
 KIND = Kind()
 DEGREE = np.pi / 180.0
@@ -23,11 +23,11 @@ def corrected(east_m, deviation):
     covariance = np.repeat(one[:, :, np.newaxis], count, axis=2)
     there = state.copy()
     there[1] = east_m
-    measured, variance = expected(KIND, there, pose), np.empty((3, count))
+    measured, variance = expected_measurement(KIND, there, pose), np.empty((3, count))
     variance[:] = np.square(deviation)[:, np.newaxis]
-    first = innovation(*linearised(KIND, state, pose), covariance, variance)
+    first = innovation(*linearise(KIND, state, pose), covariance, variance)
     apart = residual(measured, first.expected)
-    once = updated(state, covariance, first, apart)
+    once = update(state, covariance, first, apart)
     again = tuple(part.copy() for part in once)
     iterate(KIND, pose, (state, covariance), again, first, apart)
     return (state, covariance, measured, pose, variance), once, again
@@ -43,13 +43,15 @@ def test_a_precise_radar_far_across_is_where_least_squares_put_it():
         here = pose.take(slice(k, k + 1))
 
         def off(x, k=k, white=white, here=here):
-            left = residual(measured[:, k : k + 1], expected(KIND, x[:, np.newaxis], here))[:, 0]
+            left = residual(
+                measured[:, k : k + 1], expected_measurement(KIND, x[:, np.newaxis], here)
+            )[:, 0]
             return np.append(white @ (x - state[:, k]), left / np.sqrt(variance[:, k]))
 
         best = least_squares(off, state[:, k], x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15).x
         np.testing.assert_allclose(again[0][:, k], best, atol=0.02)
         slope = np.zeros((3, 6))
-        slope[:, :3] = linearised(KIND, best[:, np.newaxis], here)[1][..., 0]
+        slope[:, :3] = linearise(KIND, best[:, np.newaxis], here)[1][..., 0]
         known = np.linalg.inv(covariance[..., k]) + slope.T @ np.diag(1 / variance[:, k]) @ slope
         np.testing.assert_allclose(again[1][..., k], np.linalg.inv(known), rtol=1e-3, atol=0.02)
     # The tangent at 6 km leaves the circle by 1000² / (2 · 6000) = 83 m; it states 1 m.

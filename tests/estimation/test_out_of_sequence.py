@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from components.estimation.carried_errors import MotionWithErrors
-from components.estimation.kalman import innovation, updated
+from components.estimation.kalman import innovation, update
 from components.estimation.motion import ConstantAcceleration, ConstantVelocity, predict
 from components.estimation.out_of_sequence import retrodiction, retrodiction_by_motion
 
@@ -15,7 +15,7 @@ R = np.array([[4.0], [9.0]])
 
 def corrected(state, covariance, measured):
     known = np.einsum("mdn,dn->mn", H, state[:6])
-    return updated(state, covariance, innovation(known, H, covariance, R), measured - known)
+    return update(state, covariance, innovation(known, H, covariance, R), measured - known)
 
 
 def in_order(model, start, measurements):
@@ -41,7 +41,7 @@ def both(model, late, times=(1.0, 1.7, 2.2, 3.0)):
     then = retrodiction(
         model, before[1:], now[1:], np.array([then_s - before[0]]), np.array([now[0] - then_s])
     )
-    found = then.carried_over(*now[1:], *corrected(then.state, then.covariance, measured))
+    found = then.carry_forward(*now[1:], *corrected(then.state, then.covariance, measured))
     return found, wanted[1:], now[1]
 
 
@@ -73,7 +73,7 @@ def test_before_all_that_was_known_it_is_what_both_instants_say_together(model):
     now = state, (root @ root.T * 50.0 + np.eye(size))[:, :, np.newaxis]
     measured = RNG.normal(size=(2, 1)) * 5.0
     then = retrodiction_by_motion(model, now, since)
-    found = then.carried_over(*now, *corrected(then.state, then.covariance, measured))
+    found = then.carry_forward(*now, *corrected(then.state, then.covariance, measured))
 
     whole, slope = np.zeros((2 * size, 2 * size)), np.zeros((2, 2 * size))
     moves = np.hstack([model.jacobian(state, since)[..., 0], -np.eye(size)])
@@ -102,7 +102,7 @@ def test_errors_that_are_forgotten_were_as_large_before_all_that_was_known():
     root = there[:, :, np.newaxis]
     known = np.einsum("mdn,dn->mn", root, then.state)
     what = innovation(known, root, then.covariance, np.ones((12, 1)))
-    found = then.carried_over(*now, *updated(then.state, then.covariance, what, seen_there - known))
+    found = then.carry_forward(*now, *update(then.state, then.covariance, what, seen_there - known))
 
     moves, noise = np.eye(size), np.diag([1.0] * 6 + list(1.0 - kept**2))
     moves[:3, 3:6], moves[range(6, size), range(6, size)] = 1.3 * np.eye(3), kept

@@ -24,7 +24,7 @@ from components.estimation.carried_errors import (
 )
 from components.estimation.estimator import Estimates, ExtendedKalmanFilter, pair_measurement
 from components.estimation.frame import pose_in_frame
-from components.estimation.kalman import linear_moments, updated
+from components.estimation.kalman import linear_moments, update
 from components.estimation.measurement import Kind
 from components.estimation.motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn
 from components.estimation.unscented import SigmaPoints, UnscentedKalmanFilter
@@ -96,8 +96,10 @@ def nees_of(estimator, intensity, flown, seed=5):
         else:
             tracks = estimator.predict(tracks, np.ones(COUNT))
             foreseen = estimator.expect(KIND, tracks, place, told)
-            foreseen = [age.added(foreseen[0], model, tracks.states[0], tracks.covariances[0])]
-            measured = plain.expected(KIND, said, place)
+            foreseen = [
+                age.add_age_errors(foreseen[0], model, tracks.states[0], tracks.covariances[0])
+            ]
+            measured = plain.expected_measurement(KIND, said, place)
             away = np.linalg.norm(said[:3] - place.position_m, axis=0)
             level = away * np.cos(measured[1])
             variance = WHITE_M2 * np.stack(
@@ -231,8 +233,8 @@ def test_what_is_told_of_a_turn_is_expected_as_it_was():
     told = ReportedErrors((NORTH,), np.full((1, count), 3.0), ages.position, np.zeros(count, bool))
 
     def expected(state):
-        moments = linear_moments(*told.linearised(kind, state, place), covariance)
-        return ages._turned_back(moments, model, state, covariance)
+        moments = linear_moments(*told.linearise(kind, state, place), covariance)
+        return ages._rotate_back(moments, model, state, covariance)
 
     then, tangent = -rate * 0.9, -rate * 0.9
     radius = speed / rate
@@ -243,7 +245,7 @@ def test_what_is_told_of_a_turn_is_expected_as_it_was():
     was[:3] += 0.3 * state[3:6, 0]  # by how late it is: the error that is carried says so
     reported = np.concatenate([was[:, np.newaxis], state[6:]])
     found = expected(state)
-    wanted = told.expected(kind, reported, place)
+    wanted = told.expected_measurement(kind, reported, place)
     np.testing.assert_allclose(found.expected[2:], wanted[2:], atol=0.02)
     np.testing.assert_allclose(found.expected[:2], wanted[:2], atol=4e-6)
     for i in (3, 4, 7):
@@ -271,12 +273,12 @@ def test_a_track_that_later_looks_brought_back_keeps_a_positive_covariance(known
     state = np.zeros((12, COUNT))
     state[:6] = np.array([3000.0, -2000.0, 100.0, 60.0, -30.0, 2.0])[:, np.newaxis]
     reported = ReportedErrors(WAYS, np.tile(DEVIATION[:, np.newaxis], COUNT), age, ones < 0)
-    seen, slope = reported.linearised(KIND, state, pose())
+    seen, slope = reported.linearise(KIND, state, pose())
     ages = Ages(age, age, 0.6 * ones, 0.0 * ones)
-    moments = ages.added(linear_moments(seen, slope, covariance), model, state, covariance)
+    moments = ages.add_age_errors(linear_moments(seen, slope, covariance), model, state, covariance)
     variance = np.array([1e-10, 1e-10, 1e-4, 0.01, 0.01, 0.01])[:, np.newaxis] * ones
     found = moments.innovation(variance)
-    _, after = updated(state, covariance, found, np.zeros((6, COUNT)))
+    _, after = update(state, covariance, found, np.zeros((6, COUNT)))
     assert np.linalg.eigvalsh(after.transpose(2, 0, 1)).min() > 0.0
 
 
@@ -291,11 +293,11 @@ def test_what_a_track_and_a_report_may_have_in_common_they_have():
     state = np.zeros((12, COUNT))
     state[0] = 3000.0
     reported = ReportedErrors(WAYS, np.tile(DEVIATION[:, np.newaxis], COUNT), 0.3 * ones, ones < 0)
-    seen, slope = reported.linearised(KIND, state, pose())
+    seen, slope = reported.linearise(KIND, state, pose())
     ages = Ages(0.3 * ones, 0.3 * ones, 0.6 * ones, 0.0 * ones)
     before = linear_moments(seen, slope, covariance)
     _, shared = ages.errors(model, state, covariance[3, 3] * np.ones((3, COUNT)))
     expected = before.cross + np.einsum("ikn,mkn->imn", shared[:, :3], slope[:, :3])
     expected += np.einsum("ikn,mkn->imn", shared[:, 3:], slope[:, 3:6])
-    found = ages.added(before, model, state, covariance).cross
+    found = ages.add_age_errors(before, model, state, covariance).cross
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)

@@ -7,13 +7,13 @@ from components.estimation.frame import pose_in_frame
 from components.estimation.measurement import (
     Kind,
     direction,
-    expected,
+    expected_measurement,
     half_angle_rad,
     range_share,
 )
 from components.geometry.attitude import body_angles, body_to_ned, unit_vector
-from components.geometry.sensor_axes import turned_variances
-from components.surveillance.believed_line import OwnBelief, in_body, variances_in_body
+from components.geometry.sensor_axes import rotate_variances
+from components.surveillance.believed_line import OwnBelief, ned_to_body_angles, variances_in_body
 
 
 def spread_of(function, at, covariance):
@@ -37,7 +37,7 @@ def drawn_covariance(random, size_m):
 def test_of_a_mounting_s_axes_in_those_of_the_body(random):
     mounting = tuple(random.uniform(-1.5, 1.5, 3))
     angles, variances = random.uniform(-1.4, 1.4, 2), random.uniform(1e-6, 1e-4, 2)
-    found = turned_variances(*angles[:, np.newaxis], *variances[:, np.newaxis], mounting)
+    found = rotate_variances(*angles[:, np.newaxis], *variances[:, np.newaxis], mounting)
 
     def in_the_body(seen):
         return np.array(body_angles(*body_to_ned(*unit_vector(*seen), *mounting)))
@@ -57,7 +57,7 @@ def test_of_a_position_that_a_banked_ownship_is_told(random):
     covariance = turn.T @ np.diag([across, along, down]) @ turn
 
     def seen(offset):
-        return np.concatenate(in_body(own, offset[:, np.newaxis]))
+        return np.concatenate(ned_to_body_angles(own, offset[:, np.newaxis]))
 
     assert np.concatenate([*found.values()]) == pytest.approx(
         spread_of(seen, ned, covariance), rel=1e-4
@@ -77,7 +77,9 @@ def test_of_a_track_s_direction_and_the_cone_that_holds_it(random):
     in_the_frame = pose_in_frame(*[np.zeros((3, 1))] * 3)
 
     def angles(offset):
-        return expected(Kind(has_range=False), offset[:, np.newaxis], in_the_frame)[:, 0]
+        return expected_measurement(Kind(has_range=False), offset[:, np.newaxis], in_the_frame)[
+            :, 0
+        ]
 
     wanted = spread_of(angles, away, covariance)
     assert [float(azimuth[0]), float(elevation[0])] == pytest.approx(wanted, rel=1e-4)

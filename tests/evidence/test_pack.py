@@ -13,7 +13,7 @@ import pytest
 
 from dsa_des.block.shipped_files import folders
 from dsa_des.evidence.case import read_case
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from tests.evidence.small_case import Made, made
 
 #: Keys that name an item of a list.
@@ -192,7 +192,7 @@ def test_what_is_of_the_system_changes_with_it(case):
     assert turns(change)[0] == 20 != turns(change)[1]
     assert turns(change, "beside[0].of_system=true") == [20, 20]
     # The shipped case: its tracks are the system's own, the pilot aboard has no radar.
-    shipped = chosen_file("noncooperative", "case")
+    shipped = find_input_file("noncooperative", "case")
     found = read_case(shipped, ["set.blocks.radar.range_km=3"]).studies
     ranges = {name: study.scene(0).resolved()["blocks"].get("radar", {}).get("range_km")
               for name, study in found.items()}  # fmt: skip

@@ -13,7 +13,7 @@ import pytest
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files import output_names
 from dsa_des.files.output_folder import OutputFolder, new_folder
-from dsa_des.files.output_names import claim_folder, named, new_folder_name
+from dsa_des.files.output_names import claim_folder, new_folder_name, user_path
 from dsa_des.record.run_folder import write_run_json
 
 
@@ -202,11 +202,11 @@ def test_the_working_directory_and_what_holds_it_are_never_replaced(name, tmp_pa
 def test_home_and_the_root_are_never_replaced(tmp_path, monkeypatch):
     (tmp_path / "users" / "me").mkdir(parents=True)
     monkeypatch.setenv("HOME", str(tmp_path / "users" / "me"))
-    refused(named("~"), "is your home folder")
+    refused(user_path("~"), "is your home folder")
     refused(tmp_path / "users", "holds your home folder")
     refused(Path("/"), "working directory")
     assert left_in(tmp_path / "users") == ["me"]
-    assert named("~/x") == tmp_path / "users" / "me" / "x"
+    assert user_path("~/x") == tmp_path / "users" / "me" / "x"
 
 
 def test_links_are_refused_and_stay(tmp_path):
@@ -258,7 +258,7 @@ def test_odd_names_that_are_possible_work(name, tmp_path, monkeypatch):
 )
 def test_texts_that_name_nothing(text, match):
     with pytest.raises(UsageError, match=match):
-        named(text)
+        user_path(text)
 
 
 def test_a_mount_point_is_refused(tmp_path, monkeypatch):

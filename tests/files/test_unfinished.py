@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from dsa_des.files import output_file as module
-from dsa_des.files.output_file import EARLIER, PREFIX, remove_left_over, unfinished
+from dsa_des.files.output_file import EARLIER, PREFIX, remove_abandoned, temporary_folder
 from dsa_des.files.output_folder import OutputFolder
 
 DYING = """
@@ -44,10 +44,10 @@ def test_the_next_run_into_the_same_place_removes_what_a_killed_one_left(tmp_pat
 
 
 def test_what_a_living_process_is_at_stays(tmp_path):
-    with unfinished(tmp_path / "run") as folder:
+    with temporary_folder(tmp_path / "run") as folder:
         code = f"from dsa_des.files.output_file import *; remove_left_over(Path({str(tmp_path)!r}))"
         subprocess.run([sys.executable, "-c", code], check=True)
-        remove_left_over(tmp_path)  # not even this process takes it for left over
+        remove_abandoned(tmp_path)  # not even this process takes it for left over
         assert left_in(folder) == ["lock"]
     assert left_in(tmp_path) == []
 
@@ -55,10 +55,10 @@ def test_what_a_living_process_is_at_stays(tmp_path):
 def test_what_another_machine_is_at_stays(tmp_path, monkeypatch):
     killed(tmp_path)
     monkeypatch.setattr(module, "_host", lambda: "somewhere else")
-    remove_left_over(tmp_path)
+    remove_abandoned(tmp_path)
     assert len(left_in(tmp_path)) == 1
     monkeypatch.undo()
-    remove_left_over(tmp_path)
+    remove_abandoned(tmp_path)
     assert left_in(tmp_path) == []
 
 
@@ -69,7 +69,7 @@ def test_nothing_is_removed_where_files_cannot_be_locked(tmp_path, monkeypatch):
         raise OSError(95, "Operation not supported")
 
     monkeypatch.setattr(module.fcntl, "flock", refuse)
-    with unfinished(tmp_path / "run"):
+    with temporary_folder(tmp_path / "run"):
         assert len(left_in(tmp_path)) == 2
     assert len(left_in(tmp_path)) == 1
 
@@ -79,7 +79,7 @@ def test_an_earlier_run_is_put_back_if_its_replacement_never_came(tmp_path):
     (tmp_path / "run" / "result").write_text("earlier")
     killed(tmp_path, more=f"Path('run').rename(folder / '{EARLIER}')")
     assert not (tmp_path / "run").exists()
-    remove_left_over(tmp_path)
+    remove_abandoned(tmp_path)
     assert (tmp_path / "run" / "result").read_text() == "earlier"
     assert left_in(tmp_path) == ["run"]
 
@@ -91,10 +91,10 @@ def test_what_only_looks_like_ours_stays(content, tmp_path):
     (folder / "lock").write_text(content)
     (folder / "work").write_text("years of it")
     (tmp_path / f"{PREFIX}link").symlink_to(folder)
-    remove_left_over(tmp_path)
+    remove_abandoned(tmp_path)
     assert left_in(folder) == ["lock", "work"]
     (folder / "lock").unlink()
-    remove_left_over(tmp_path)
+    remove_abandoned(tmp_path)
     assert left_in(folder) == ["work"]
 
 
@@ -106,7 +106,7 @@ def test_links_in_what_was_left_are_not_followed(tmp_path):
     about = json.loads(lock.read_text())
     lock.write_text(json.dumps({**about, "target": "../../escaped"}))
     (folder / EARLIER).mkdir()
-    remove_left_over(tmp_path)
+    remove_abandoned(tmp_path)
     assert left_in(tmp_path) == ["escaped", "precious"]
     assert left_in(tmp_path / "precious") == ["work"]
 
@@ -119,7 +119,7 @@ def test_folders_whose_maker_was_killed_at_once_and_old_files_go_as_well(tmp_pat
         (tmp_path / f"{PREFIX}{name}").write_text("")
         then = time.time() - age_s
         os.utime(tmp_path / f"{PREFIX}{name}", (then, then))
-    remove_left_over(tmp_path)
+    remove_abandoned(tmp_path)
     assert left_in(tmp_path) == [f"{PREFIX}new"]
 
 
@@ -136,6 +136,6 @@ def test_a_maker_whose_folder_is_cleared_away_at_once_makes_another(tmp_path, mo
         return real(path, *args, **kwargs)
 
     monkeypatch.setattr(os, "open", robbed)
-    with unfinished(tmp_path / "runs" / "x") as folder:
+    with temporary_folder(tmp_path / "runs" / "x") as folder:
         assert left_in(folder) == ["lock"]
     assert len(tries) == 3

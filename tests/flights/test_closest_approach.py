@@ -14,7 +14,7 @@ from components.flights.closest_approach import (
     KnownTimes,
     RegularTimes,
     closest_approaches,
-    look_between,
+    refine_between_samples,
 )
 from components.flights.legs import Straight, Turn
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
@@ -122,7 +122,7 @@ def test_numbers_of_regular_times_are_those_inside(step_s, duration_s, first_s, 
     times = np.round(np.arange(int(duration_s / step_s) + 1) * step_s, 9)
     inside = np.flatnonzero((times >= first_s) & (times <= first_s + length_s))
     one = np.zeros(1, dtype=np.int64)
-    first, last = RegularTimes(step_s, duration_s).between(
+    first, last = RegularTimes(step_s, duration_s).numbers_between(
         one, np.array([first_s]), np.array([first_s + length_s])
     )
     if len(inside):
@@ -224,7 +224,7 @@ def test_between_two_times_the_closest_approach_is_that_of_straight_flights(pass
 
     best = Approaches(known_s.copy(), np.array([range_m(t, k) for k, t in enumerate(known_s)]))
     end_s = np.array([passes_s + 30.0, passes_s - 0.4, 30.0])
-    look_between(own_at, other_at, np.full(3, step_s), (np.zeros(3), end_s), best)
+    refine_between_samples(own_at, other_at, np.full(3, step_s), (np.zeros(3), end_s), best)
     # The second is not there any more, and the third's step ends before it passes.
     expected_s = [passes_s, passes_s - 0.4, 9.0 - 1.11 * step_s]
     assert best.time_s[:2] == pytest.approx(expected_s[:2], abs=2e-3)

@@ -68,7 +68,7 @@ def test_whoever_comes_in_reach_is_active(seed: int) -> None:
     left_out = 0
     for start in np.arange(0, 300, 7.3):
         times = np.linspace(start, start + 13.0, 60)
-        columns = intervals.during(times[0], times[-1])
+        columns = intervals.targets_near(times[0], times[-1])
         own, all_states = OWN.at(times), fleet.at(times)
         _, _, range_m = line_of_sight(
             own.lat_deg[:, None], own.lon_deg[:, None], own.alt_m[:, None],
@@ -119,7 +119,7 @@ def test_absent_targets_and_an_absent_ownship_are_near_nobody() -> None:
     assert found.target.tolist() == [0, 2]
     assert found.end_s == pytest.approx([20, 60], abs=0.6)
     none = near_intervals(ALONE, ScriptedFleet([]), 1000.0, 100.0)
-    assert len(none.during(0, 100)) == 0 == none.most_at_once()
+    assert len(none.targets_near(0, 100)) == 0 == none.most_at_once()
 
 
 def test_a_flight_along_the_edge_of_the_reach_is_not_cut_up_for_ever() -> None:
@@ -128,7 +128,7 @@ def test_a_flight_along_the_edge_of_the_reach_is_not_cut_up_for_ever() -> None:
     )
     found = near_intervals(ALONE, ScriptedFleet([beside]), 15_000.0, 86_400.0)
     assert len(found.target) < 200
-    assert found.during(40_000, 40_001).tolist() == [0]
+    assert found.targets_near(40_000, 40_001).tolist() == [0]
 
 
 def test_speed_bounds_hold_for_sampled_flights() -> None:
@@ -222,7 +222,7 @@ def test_culling_changes_nothing_but_the_counts(
 
 
 def test_keys_of_draws_are_made_for_those_who_are_drawn_for() -> None:
-    roster = Roster.of([(f"t{i}", Aircraft()) for i in range(50)])
+    roster = Roster.from_pairs([(f"t{i}", Aircraft()) for i in range(50)])
     some = np.array([7, 3, 7, 49])
     keys = roster.keys_of(some)
     assert "keys" not in vars(roster)

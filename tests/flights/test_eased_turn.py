@@ -7,7 +7,7 @@ import pytest
 
 from components.flights.legs import Straight, Turn
 from components.flights.many_flights import SteeredFlight
-from components.flights.point_mass import eased_turn
+from components.flights.point_mass import eased_turn_rates
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.messages.steering import Manoeuvre
 
@@ -28,7 +28,7 @@ def told(heading_deg, **changes):
 @pytest.mark.parametrize("speed_mps", [35.0, 50.0, 180.0])
 def test_all_of_the_turn_is_turned_and_never_faster_than_told(turn_deg, speed_mps):
     left = math.radians(turn_deg)
-    rates = eased_turn(left, left, 0.0, speed_mps, MOST, EASES)
+    rates = eased_turn_rates(left, left, 0.0, speed_mps, MOST, EASES)
     assert sum(lasts_s * rate for lasts_s, rate in rates) == pytest.approx(turn_deg, abs=1e-9)
     assert max(abs(rate) for _, rate in rates) < 3.0 + 1e-6
     assert all(rate == 0.0 or abs(rate) >= 0.0999 for _, rate in rates)
@@ -38,7 +38,7 @@ def test_all_of_the_turn_is_turned_and_never_faster_than_told(turn_deg, speed_mp
 def test_the_bank_begins_at_30_degrees_a_second():
     """|p| <= 0.524 rad/s: after k tenths the bank is k times 0.0524 rad, and the rate follows."""
     left = math.radians(90.0)
-    rates = eased_turn(left, left, 0.0, 50.0, MOST, EASES)
+    rates = eased_turn_rates(left, left, 0.0, 50.0, MOST, EASES)
     assert rates[0] == (pytest.approx(0.05), 0.0)
     for k in (1, 2, 3):
         rate = math.degrees(G_M_S2 * math.tan(0.0524 * k) / 50.0)
@@ -47,7 +47,7 @@ def test_the_bank_begins_at_30_degrees_a_second():
 
 def test_near_the_heading_the_rate_is_in_proportion_to_what_was_left_a_second_ago():
     left = math.radians(60.0)
-    rates = eased_turn(left, left, 0.0, 50.0, MOST, EASES)
+    rates = eased_turn_rates(left, left, 0.0, 50.0, MOST, EASES)
     at_s = np.cumsum([lasts_s for lasts_s, _ in rates])
     left_deg = 60.0 - np.cumsum([lasts_s * rate for lasts_s, rate in rates])
     # Seconds of the law, which begin half a tenth after the turn does.
@@ -61,7 +61,7 @@ def test_near_the_heading_the_rate_is_in_proportion_to_what_was_left_a_second_ag
 
 @pytest.mark.parametrize("to_deg", [237.0, 130.0, 5.0, 217.0])
 def test_a_steered_flight_ends_on_the_track(to_deg):
-    flight = SteeredFlight(OWN).steered(12.0, told(to_deg))
+    flight = SteeredFlight(OWN).add_manoeuvre(12.0, told(to_deg))
     after = flight.at(np.array([11.99, 80.0]))
     assert math.degrees(after.yaw_rad[0]) == pytest.approx(217.0, abs=0.01)
     # The great circle that it flies on turns by a few thousandths.
@@ -71,8 +71,8 @@ def test_a_steered_flight_ends_on_the_track(to_deg):
 
 
 def test_a_second_turn_goes_on_from_the_bank_and_the_heading_of_a_second_ago():
-    once = SteeredFlight(OWN).steered(12.0, told(307.0))
-    again = once.steered(20.0, told(307.0))
+    once = SteeredFlight(OWN).add_manoeuvre(12.0, told(307.0))
+    again = once.add_manoeuvre(20.0, told(307.0))
     times = np.arange(12.0, 60.0, 0.1)
     one, other = once.at(times), again.at(times)
     np.testing.assert_allclose(one.yaw_rad, other.yaw_rad, atol=1e-4)
@@ -80,8 +80,8 @@ def test_a_second_turn_goes_on_from_the_bank_and_the_heading_of_a_second_ago():
 
 
 def test_a_climb_lets_an_eased_turn_go_on():
-    turning = SteeredFlight(OWN).steered(12.0, told(307.0))
-    both = turning.steered(15.0, Manoeuvre(climb_m=100.0, climb_rate_mps=4.0))
+    turning = SteeredFlight(OWN).add_manoeuvre(12.0, told(307.0))
+    both = turning.add_manoeuvre(15.0, Manoeuvre(climb_m=100.0, climb_rate_mps=4.0))
     assert both.at(np.array([70.0])).alt_m[0] == pytest.approx(1000.0, abs=1e-6)
     assert both.at(np.array([70.0])).yaw_rad[0] == pytest.approx(
         turning.at(np.array([70.0])).yaw_rad[0], abs=1e-6

@@ -107,7 +107,7 @@ def test_flights_made_together_lie_in_memory_once():
     times, rng = np.arange(0.0, 60.0), np.random.default_rng(2)
     position = [rng.uniform(-1, 1, (60, 5)).cumsum(axis=0) * 1e-4 + of for of in (52, 179.99, 900)]
     names = [*"abcde"]
-    made = SampledTrajectory.together(names, times, *position)
+    made = SampledTrajectory.make_all(names, times, *position)
     alone = [
         SampledTrajectory(name, times, *(part[:, k] for part in position))
         for k, name in enumerate(names)

@@ -28,7 +28,7 @@ def same(one, other):
 
 def test_sampled_together_are_those_made_alone():
     lat, lon, alt = paths(207, np.random.default_rng(5))
-    together = SampledTrajectory.together([f"a{k}" for k in range(207)], TIMES, lat, lon, alt)
+    together = SampledTrajectory.make_all([f"a{k}" for k in range(207)], TIMES, lat, lon, alt)
     for k in (0, 1, 3, 120, 198, 199, 200, 206):  # blocks of cells end at 199
         alone = SampledTrajectory(f"a{k}", TIMES, lat[:, k], lon[:, k], alt[:, k])
         for name in ("coefficients", "lon_deg", "yaw_rad", "pitch_rad", "roll_rad"):
@@ -41,7 +41,7 @@ def test_a_bad_sample_of_one_names_it():
     lat, lon, alt = paths(3, np.random.default_rng(5))
     lat[7, 2] = 91.0
     with pytest.raises(ValueError, match=r"c: lat_deg is 91.0 \(sample 7\)"):
-        SampledTrajectory.together(["a", "b", "c"], TIMES, lat, lon, alt)
+        SampledTrajectory.make_all(["a", "b", "c"], TIMES, lat, lon, alt)
 
 
 class Still:
@@ -56,7 +56,7 @@ class Still:
 
 def test_flights_of_all_kinds_are_asked_together():
     lat, lon, alt = paths(2, np.random.default_rng(8))
-    sampled = SampledTrajectory.together(["a", "b"], TIMES, lat, lon, alt)
+    sampled = SampledTrajectory.make_all(["a", "b"], TIMES, lat, lon, alt)
     legs = [Straight(duration_s=9), Turn(rate_deg_s=3, duration_s=9), Straight()]
     scripted = [
         ScriptedTrajectory(
@@ -68,9 +68,9 @@ def test_flights_of_all_kinds_are_asked_together():
     right = Manoeuvre(turn_rad=1.0, rate_rad_s=0.05)
     up = Manoeuvre(climb_m=90.0, climb_rate_mps=5.0)
     steered = [
-        SteeredFlight(sampled[0]).steered(7.25, right).steered(20.0, up),
+        SteeredFlight(sampled[0]).add_manoeuvre(7.25, right).add_manoeuvre(20.0, up),
         SteeredFlight(scripted[0]),
-        SteeredFlight(scripted[1]).steered(3.0, up),
+        SteeredFlight(scripted[1]).add_manoeuvre(3.0, up),
     ]
     flights = [sampled[0], *steered, scripted[1], Still(sampled[1]), sampled[1], scripted[0]]
     rng = np.random.default_rng(2)
@@ -84,12 +84,12 @@ def test_flights_of_all_kinds_are_asked_together():
 def test_a_fleet_of_all_kinds_says_what_scripts_fix():
     """Ground speeds and fixed angles, NaN where no script says them."""
     lat, lon, alt = paths(1, np.random.default_rng(8))
-    (sampled,) = SampledTrajectory.together(["a"], TIMES, lat, lon, alt)
+    (sampled,) = SampledTrajectory.make_all(["a"], TIMES, lat, lon, alt)
     start = {"lat_deg": -66.0, "lon_deg": 179.9, "alt_m": 900.0, "heading_deg": 217.0}
     slow = ScriptedTrajectory("slow", **start, speed_mps=40.0, roll_deg=9.0)
     fast = ScriptedTrajectory("fast", **start, speed_mps=70.0)
     up = Manoeuvre(climb_m=90.0, climb_rate_mps=5.0)
-    steered = SteeredFlight(slow).steered(3.0, up)
+    steered = SteeredFlight(slow).add_manoeuvre(3.0, up)
     found = MixedFleet([fast, Still(fast), steered, sampled, slow])
     which, time_s = np.array([2, 4, 0, 3, 1, 2]), np.array([2.0, 9.0, 9.0, 9.0, 9.0, 5.0])
     nan = np.nan

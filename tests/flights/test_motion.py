@@ -5,7 +5,7 @@ import pytest
 
 from components.flights.geodesic_motion import _distance_series, _longitude_series
 from components.flights.leg_motion import hold_state
-from components.flights.point_mass import FT_S_PER_KT, fly_euler, fly_point_mass, summed
+from components.flights.point_mass import FT_S_PER_KT, cumulative_sums, fly_euler, fly_point_mass
 
 
 def commands(seconds: int, a: float, climb: float, turn_deg: float, tracks: int = 1):
@@ -130,9 +130,9 @@ def test_sums_begin_at_the_start_and_take_each_rate_once(count):
     start = np.arange(count) * 10.0
     rates = np.stack([np.full(count, rate) for rate in (1.0, -2.0, 4.0, 8.0)])
     expected = [start, start + 1.0, start - 1.0, start + 3.0]
-    np.testing.assert_array_equal(summed(start, rates), expected)
-    np.testing.assert_array_equal(summed(start, rates[:2]), expected[:2])
-    np.testing.assert_array_equal(summed(start, rates[:1]), expected[:1])
+    np.testing.assert_array_equal(cumulative_sums(start, rates), expected)
+    np.testing.assert_array_equal(cumulative_sums(start, rates[:2]), expected[:2])
+    np.testing.assert_array_equal(cumulative_sums(start, rates[:1]), expected[:1])
 
 
 @pytest.mark.parametrize(("eps", "n"), [(0.03, 0.02), (0.02, -0.03), (-0.025, 0.03)])

@@ -36,7 +36,7 @@ def enu(state, start=START):
 
 def test_velocity_moves_straight_to_the_commanded_one_and_stays():
     """From (0, 10) to (16, -2) m/s: 20 m/s at 5 m/s² take 4 s; the way is v t + a t² / 2."""
-    flown = flight().steered(20.0, told(16.0, -2.0))
+    flown = flight().add_manoeuvre(20.0, told(16.0, -2.0))
     times = np.array([20.0, 21.0, 24.0, 30.0])
     gone = np.minimum(times - 20.0, 4.0)
     left = times - 20.0 - gone
@@ -52,7 +52,7 @@ def test_velocity_moves_straight_to_the_commanded_one_and_stays():
 
 def test_commands_follow_each_other_from_the_velocity_of_the_moment():
     """After 2 s of the first ramp (8, 4) m/s; from there back to rest in 4 / √5 s."""
-    flown = flight().steered(0.0, told(16.0, -2.0)).steered(2.0, told(0.0, 0.0))
+    flown = flight().add_manoeuvre(0.0, told(16.0, -2.0)).add_manoeuvre(2.0, told(0.0, 0.0))
     speed = math.hypot(8.0, 4.0)
     stops_m = np.array([8.0, 4.0]) * (0.5 * speed / 5.0)
     before = np.array([0.5 * 4.0 * 4.0, 20.0 - 0.5 * 3.0 * 4.0])
@@ -65,7 +65,11 @@ def test_commands_follow_each_other_from_the_velocity_of_the_moment():
 
 
 def test_a_turn_after_a_velocity_begins_with_its_track_and_speed():
-    turned = flight().steered(0.0, told(12.0, 0.0)).steered(30.0, Manoeuvre(math.pi / 2, 0.1))
+    turned = (
+        flight()
+        .add_manoeuvre(0.0, told(12.0, 0.0))
+        .add_manoeuvre(30.0, Manoeuvre(math.pi / 2, 0.1))
+    )
     state = turned.at(np.array([29.9, 30.1, 60.0, 70.0]))
     np.testing.assert_allclose(state.yaw_rad[:2], [math.pi / 2, math.pi / 2 + 0.01], atol=1e-3)
     assert state.yaw_rad[2] == pytest.approx(math.pi, abs=1e-3)
@@ -74,7 +78,7 @@ def test_a_turn_after_a_velocity_begins_with_its_track_and_speed():
 
 
 def test_it_levels_off_and_follows_the_geodesic():
-    flown = flight(speed_mps=10.0, climb_mps=2.0).steered(10.0, told(12.0, 16.0, 100.0))
+    flown = flight(speed_mps=10.0, climb_mps=2.0).add_manoeuvre(10.0, told(12.0, 16.0, 100.0))
     assert flown.at(np.array([10.0, 500.0])).alt_m == pytest.approx(120.0)
     begin, end = flown.at(10.2), flown.at(510.2)
     way = Geodesic.WGS84.Inverse(

@@ -19,7 +19,7 @@ GRIDS = {
 @pytest.mark.parametrize("name", GRIDS)
 def test_a_piece_is_that_of_a_search(name: str) -> None:
     grids = GRIDS[name]
-    find = PieceSearch.of(grids)
+    find = PieceSearch.from_starts(grids)
     assert (find._per_s is not None) is (name in ("even", "shaken"))
     path = RNG.integers(0, len(grids), 4000)
     times = np.array([RNG.uniform(grids[k][0] - 2.0, grids[k][-1] + 2.0) for k in path])

@@ -28,7 +28,7 @@ def flight(name, lat_deg, lon_deg, heading_deg, speed_mps):
 
 def near(culling, own, times):
     """Return which targets may be in reach of one ownship at times, (times, targets)."""
-    return culling.near(own, np.zeros(len(times), dtype=np.int64), times)[1]
+    return culling.states_and_near(own, np.zeros(len(times), dtype=np.int64), times)[1]
 
 
 @pytest.mark.parametrize(("seed", "reach_m"), [(1, 8000.0), (2, 2000.0), (3, 40_000.0)])
@@ -61,7 +61,7 @@ def test_whoever_is_in_reach_is_near(seed, reach_m):
             alone = near(culling, own, times[row : row + 1])
             assert alone.tolist() == whole[row : row + 1].tolist()
         turn = Manoeuvre(math.radians(draw.uniform(-170, 170)), math.radians(3.0))
-        own = own.steered(np.array([0]), np.array([later]), [turn])
+        own = own.add_manoeuvres(np.array([0]), np.array([later]), [turn])
         culling.forget(0, later)
         assert own[0].max_speed_mps < 70.0 * 1.01
         now = later
@@ -79,7 +79,7 @@ def test_what_was_known_of_a_later_time_is_forgotten_at_a_turn():
     ]  # fmt: skip
     before = SteeredFleet(ScriptedFleet([flight("own", -43.0, 172.0, 217.0, 90.0)]))
     times = np.arange(0.0, 300.0, 7.0)
-    turned = before.steered(np.array([0]), np.array([40.0]), [Manoeuvre(math.pi, 0.05)])
+    turned = before.add_manoeuvres(np.array([0]), np.array([40.0]), [Manoeuvre(math.pi, 0.05)])
     looked_ahead, fresh = (
         SteeredCulling(before, ScriptedFleet(targets), 9000.0, 300.0) for _ in "ab"
     )
@@ -133,7 +133,7 @@ def test_whoever_comes_in_reach_of_an_ownship_that_was_told_to_fly_faster_is_nea
         own = SteeredFleet(ScriptedFleet([flight("own", 52.0, 4.0, 20.0, 40.0)]))
         culling = SteeredCulling(own, fleet, 3000.0, 200.0)
         faster = Manoeuvre(speed_mps=130.0, acceleration_mps2=3.0)
-        own = own.steered(np.array([0]), np.array([5.0]), [faster])
+        own = own.add_manoeuvres(np.array([0]), np.array([5.0]), [faster])
         times = np.arange(6.0, 200.0, 0.5)
         whole = near(culling, own, times)
         here, there = own[0].at(times), fleet.at(times)

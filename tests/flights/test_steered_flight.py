@@ -18,7 +18,7 @@ STRAIGHT = ScriptedTrajectory(
 
 def test_before_the_manoeuvre_nothing_changes():
     times = np.linspace(0.0, 30.0, 61)
-    turned = SteeredFlight(STRAIGHT).steered(30.5, Manoeuvre(0.3, 0.05))
+    turned = SteeredFlight(STRAIGHT).add_manoeuvre(30.5, Manoeuvre(0.3, 0.05))
     for got, expected in zip(turned.at(times).arrays(), STRAIGHT.at(times).arrays(), strict=True):
         assert np.array_equal(got, expected)
 
@@ -26,7 +26,7 @@ def test_before_the_manoeuvre_nothing_changes():
 @pytest.mark.parametrize("turn_deg", [-40.0, 25.0, 170.0])
 def test_it_turns_by_the_angle_at_the_rate_without_a_jump(turn_deg):
     rate = math.radians(3.0)
-    turned = SteeredFlight(STRAIGHT).steered(20.0, Manoeuvre(math.radians(turn_deg), rate))
+    turned = SteeredFlight(STRAIGHT).add_manoeuvre(20.0, Manoeuvre(math.radians(turn_deg), rate))
     done_s = 20.0 + abs(turn_deg) / 3.0
     yaw = turned.at(np.array([20.0, done_s + 1.0])).yaw_rad
     change = math.remainder(float(yaw[1] - yaw[0]), 2.0 * math.pi)
@@ -49,7 +49,7 @@ def test_a_turn_by_bank_rolls_in_at_the_rate(speed_mps, turn_deg):
         "own", lat_deg=-41.0, lon_deg=4.0, alt_m=1000.0, heading_deg=217.0, speed_mps=speed_mps
     )
     manoeuvre = Manoeuvre(math.radians(turn_deg), bank_rad=bank, roll_rate_rad_s=roll)
-    flight = SteeredFlight(own).steered(3.0, manoeuvre)
+    flight = SteeredFlight(own).add_manoeuvre(3.0, manoeuvre)
     step = 1e-3
     since = np.arange(0.0, 12.0, step)
     rate = 9.80665 * np.tan(np.minimum(roll * since, bank)) / speed_mps
@@ -77,7 +77,7 @@ def test_a_manoeuvre_at_the_start_keeps_the_speed(time_s):
     )  # fmt: skip
     rises = Manoeuvre(vertical_speed_mps=2.0, vertical_acceleration_mps2=10.0)
     for manoeuvre, climb_mps in ((Manoeuvre(0.3, 0.1), 0.0), (rises, 5.0)):
-        state = SteeredFlight(own).steered(time_s, manoeuvre).at(np.array([4.0, 5.0]))
+        state = SteeredFlight(own).add_manoeuvre(time_s, manoeuvre).at(np.array([4.0, 5.0]))
         north, east, _ = line_of_sight_ned(
             state.lat_deg[:1], state.lon_deg[:1], state.alt_m[:1],
             state.lat_deg[1:], state.lon_deg[1:], state.alt_m[1:],
@@ -88,15 +88,15 @@ def test_a_manoeuvre_at_the_start_keeps_the_speed(time_s):
 
 def test_a_manoeuvre_that_comes_in_a_roll_goes_on_from_there():
     manoeuvre = Manoeuvre(1.2, bank_rad=0.7, roll_rate_rad_s=0.15)
-    once = SteeredFlight(STRAIGHT).steered(10.0, manoeuvre)
-    climbs = once.steered(12.0, Manoeuvre(climb_m=100.0, climb_rate_mps=5.0))
+    once = SteeredFlight(STRAIGHT).add_manoeuvre(10.0, manoeuvre)
+    climbs = once.add_manoeuvre(12.0, Manoeuvre(climb_m=100.0, climb_rate_mps=5.0))
     times = np.array([11.0, 13.0, 16.0, 30.0])
     assert climbs.at(times).yaw_rad == pytest.approx(once.at(times).yaw_rad, abs=1e-5)
 
 
 def test_manoeuvres_follow_each_other_and_the_old_flight_stays():
-    once = SteeredFlight(STRAIGHT).steered(10.0, Manoeuvre(0.5, 0.05))
-    twice = once.steered(40.0, Manoeuvre(-0.5, 0.05))
+    once = SteeredFlight(STRAIGHT).add_manoeuvre(10.0, Manoeuvre(0.5, 0.05))
+    twice = once.add_manoeuvre(40.0, Manoeuvre(-0.5, 0.05))
     assert len(once.parts) == 1
     times = np.array([5.0, 25.0, 39.9])
     for got, expected in zip(twice.at(times).arrays(), once.at(times).arrays(), strict=True):
@@ -109,13 +109,17 @@ def test_a_climbing_flight_levels_off():
         "own", lat_deg=52.0, lon_deg=4.0, alt_m=1000.0, heading_deg=0.0, speed_mps=60.0,
         climb_mps=5.0,
     )  # fmt: skip
-    state = SteeredFlight(climbing).steered(10.0, Manoeuvre(0.2, 0.05)).at(np.array([10.0, 50.0]))
+    state = (
+        SteeredFlight(climbing).add_manoeuvre(10.0, Manoeuvre(0.2, 0.05)).at(np.array([10.0, 50.0]))
+    )
     assert state.alt_m == pytest.approx([1050.0, 1050.0], abs=0.01)
 
 
 @pytest.mark.parametrize("climb_m", [180.0, -240.0])
 def test_it_climbs_by_the_change_at_the_rate_and_levels_off(climb_m):
-    flight = SteeredFlight(STRAIGHT).steered(20.0, Manoeuvre(climb_m=climb_m, climb_rate_mps=4.0))
+    flight = SteeredFlight(STRAIGHT).add_manoeuvre(
+        20.0, Manoeuvre(climb_m=climb_m, climb_rate_mps=4.0)
+    )
     done_s = 20.0 + abs(climb_m) / 4.0
     state = flight.at(np.array([20.0, 30.0, done_s, done_s + 50.0]))
     start = float(STRAIGHT.at(np.array([20.0])).alt_m[0])
@@ -138,7 +142,7 @@ def test_a_speed_changes_steadily(change):
         (Manoeuvre(vertical_speed_mps=change, vertical_acceleration_mps2=1.5), "up"),
     ):
         times = np.linspace(0.0, ends_s + 20.0, 173)
-        state = SteeredFlight(climbing).steered(10.0, told).at(10.0 + times)
+        state = SteeredFlight(climbing).add_manoeuvre(10.0, told).at(10.0 + times)
         north, east, _ = line_of_sight_ned(
             52.0, 4.0, 1000.0, state.lat_deg, state.lon_deg, np.full(len(times), 1000.0)
         )
@@ -154,7 +158,7 @@ def test_a_speed_changes_steadily(change):
 
 def test_a_speed_does_not_become_negative():
     told = Manoeuvre(speed_mps=-80.0, acceleration_mps2=4.0)
-    state = SteeredFlight(STRAIGHT).steered(0.0, told).at(np.array([16.0, 50.0]))
+    state = SteeredFlight(STRAIGHT).add_manoeuvre(0.0, told).at(np.array([16.0, 50.0]))
     assert state.lon_deg[0] == state.lon_deg[1]
 
 
@@ -172,7 +176,7 @@ def test_who_is_told_more_often_than_others_flies_as_if_alone():
     ):
         alone = SteeredFlight(STRAIGHT)
         for time_s, manoeuvre in one:
-            alone = alone.steered(time_s, manoeuvre)
+            alone = alone.add_manoeuvre(time_s, manoeuvre)
         for got, expected in zip(found.at(times).arrays(), alone.at(times).arrays(), strict=True):
             assert np.array_equal(got, expected)
 
@@ -244,7 +248,7 @@ def test_turns_climbs_and_speeds_are_flown_together(told):
     )
     flight = SteeredFlight(own)
     for time_s, manoeuvre in told:
-        flight = flight.steered(time_s, manoeuvre)
+        flight = flight.add_manoeuvre(time_s, manoeuvre)
     times = np.array([4.0, 8.5, 11.5, 12.5, 17.0, 24.0, 26.0, 33.0, 41.0, 60.0])
     want = reckoned((math.radians(217.0), 0.0, 55.0), told, times)
     state = flight.at(times)
@@ -262,8 +266,8 @@ def test_a_turn_that_a_climb_meets_ends_where_it_would_have_ended():
     commands = [(10.0, TURN), (13.1, CLIMB), (13.1, FASTER), (29.7, SINK)]
     alone = SteeredFlight(STRAIGHT)
     for time_s, manoeuvre in commands:
-        alone = alone.steered(time_s, manoeuvre)
-    only = SteeredFlight(STRAIGHT).steered(10.0, TURN)
+        alone = alone.add_manoeuvre(time_s, manoeuvre)
+    only = SteeredFlight(STRAIGHT).add_manoeuvre(10.0, TURN)
     ends = np.array([30.0])
     assert alone.at(ends).yaw_rad == pytest.approx(only.at(ends).yaw_rad, abs=1e-4)
     times = np.linspace(0.0, 80.0, 33)

@@ -323,7 +323,7 @@ def test_a_missing_pymavlink_is_named(monkeypatch):
 def test_any_bytes_are_taken():
     random, link, before = np.random.default_rng(2), Link(), AutopilotSays()
     for size in range(200):
-        assert link.heard(random.bytes(size), before) is before
+        assert link.update(random.bytes(size), before) is before
 
 
 if __name__ == "__main__":  # record the exchange again

@@ -45,10 +45,10 @@ def test_units_are_what_they_are_defined_as(known, expected):
 def test_what_is_said_of_single_aircraft_is_said_once():
     notes, other = ReadingNotes(), ReadingNotes()
     for name in ("a", "b", "c"):
-        notes.of_one(name, "gap", "a gap of 9 s")
-    notes.of_one("c", "gap", "a gap of 9 s")
-    notes.of_one("d", "turn", "turns", harmless=True)
-    other.of_one("e", "gap", "a gap of 2 s")
+        notes.note_aircraft(name, "gap", "a gap of 9 s")
+    notes.note_aircraft("c", "gap", "a gap of 9 s")
+    notes.note_aircraft("d", "turn", "turns", harmless=True)
+    other.note_aircraft("e", "gap", "a gap of 2 s")
     notes.settle()
     notes.add(other, "own.csv")
     notes.settle()

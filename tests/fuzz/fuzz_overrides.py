@@ -7,7 +7,7 @@ import fuzz_values
 from fuzz_cases import Case
 from fuzz_scenes import base_scene, command, set_parameter
 
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.files.toml_files import to_toml
 
 KEYS = (
@@ -57,7 +57,7 @@ def override_case(rng: random.Random, case: Case) -> Case:
             case.argv += ["--set", _word(rng.choice((*KEYS, "=", "a=", "=1", "a==b", "a=b=c")))]
         elif kind < 0.85:
             block = rng.choice((*scene["blocks"], "", "nobody", "x" * 300, "\x1b[2J", "weather"))
-            types = (*registered(), *fuzz_values.TEXTS)
+            types = (*entry_points_of(), *fuzz_values.TEXTS)
             case.argv += ["--swap", _word(f"{block}={rng.choice(types)}")]
         elif kind < 0.93:
             case.argv += ["--duration", _word(rng.choice(DURATIONS))]

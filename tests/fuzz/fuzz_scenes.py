@@ -13,7 +13,7 @@ import fuzz_values
 from fuzz_cases import Case
 
 from dsa_des.block.component import Parameters
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.registry import section_models
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
@@ -136,7 +136,7 @@ def _merge(base: dict[str, Any], over: dict[str, Any]) -> None:
 @lru_cache(maxsize=1)
 def known_keys() -> dict[str, tuple[str, ...]]:
     """Return dotted parameter names by block type, and those of each section."""
-    found = {name: _names(point.load().Parameters) for name, point in registered().items()}
+    found = {name: _names(point.load().Parameters) for name, point in entry_points_of().items()}
     return found | {f"[{name}]": _names(model) for name, model in section_models().items()}
 
 

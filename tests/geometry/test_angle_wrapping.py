@@ -12,7 +12,7 @@ from components.geometry.angles import (
     TWO_PI,
     heading_from_deg,
     longitude_difference_deg,
-    past,
+    remainder,
     wrap_by_sines,
     wrap_difference_rad,
     wrap_heading_rad,
@@ -105,17 +105,17 @@ def test_the_cheap_forms_agree_with_the_exact_ones_within_a_few_turns(angle):
     assert abs(wrap_pi(wrap_difference_rad(one)[0] - wrap_pi(angle))) < 1e-14
     assert abs(wrap_pi(wrap_by_sines(one)[0] - wrap_pi(angle))) < 1e-14
     assert abs(wrap_pi(wrap_heading_rad(one)[0] - wrap_two_pi(angle))) < 1e-14
-    assert abs(wrap_pi(past(one, TWO_PI)[0] - wrap_two_pi(angle))) < 1e-14
+    assert abs(wrap_pi(remainder(one, TWO_PI)[0] - wrap_two_pi(angle))) < 1e-14
     assert np.abs(wrap_difference_rad(one)).max() <= np.pi
-    for inside in (wrap_heading_rad(one), past(one, TWO_PI)):
+    for inside in (wrap_heading_rad(one), remainder(one, TWO_PI)):
         assert (inside >= 0.0).all()
         assert (inside < TWO_PI).all()
 
 
 def test_what_rounds_up_to_a_whole_turn_is_none():
     tiny = np.array([-1e-20, 0.0, 1e-20])
-    assert past(tiny, 360.0).tolist() == [0.0, 0.0, 1e-20]
-    assert past(tiny, TWO_PI).tolist() == [0.0, 0.0, 1e-20]
+    assert remainder(tiny, 360.0).tolist() == [0.0, 0.0, 1e-20]
+    assert remainder(tiny, TWO_PI).tolist() == [0.0, 0.0, 1e-20]
     assert wrap_heading_rad(tiny).tolist() == [0.0, 0.0, 1e-20]
     assert heading_from_deg(-143.0) == np.radians(217.0)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.geometry import turned_by_meridians
+from components.geometry import rotate_to_meridian
 
 
 @pytest.mark.parametrize("pole", [1.0, -1.0])
@@ -19,7 +19,7 @@ def test_near_a_pole_a_vector_stays_the_same_in_the_plane(pole):
         return np.stack([-pole * x * north - y * east, -pole * y * north + x * east])
 
     here = rng.standard_normal((3, 50))
-    there = turned_by_meridians(here, (lat, lon), (other_lat, other_lon))
+    there = rotate_to_meridian(here, (lat, lon), (other_lat, other_lon))
     np.testing.assert_allclose(in_plane(there, other_lon), in_plane(here, lon), atol=1e-6)
     assert (there[2] == here[2]).all()
 
@@ -28,5 +28,5 @@ def test_near_a_pole_a_vector_stays_the_same_in_the_plane(pole):
 def test_elsewhere_meridians_meet_by_the_sine_of_the_latitude(lat_deg):
     """Over the date line, too: 0.02° farther east north is 0.02° · sin(latitude) to the left."""
     north = np.array([[1.0], [0.0], [0.0]])
-    east = turned_by_meridians(north, ([lat_deg], [179.99]), ([lat_deg], [-179.99]))[1]
+    east = rotate_to_meridian(north, ([lat_deg], [179.99]), ([lat_deg], [-179.99]))[1]
     assert east == pytest.approx(np.radians(0.02) * np.sin(np.radians(lat_deg)), abs=1e-9)

@@ -10,7 +10,13 @@ from hypothesis import strategies as st
 from components.alert_configuration.conf_file import default_values
 from components.guidance.altitudes import Altitudes
 from components.guidance.bands import resolution
-from components.guidance.intervals import Band, Interval, clear_intervals, painted, same_place
+from components.guidance.intervals import (
+    Band,
+    Interval,
+    clear_intervals,
+    is_same_value,
+    paint_bands,
+)
 from components.guidance.kinds import kind_of
 from components.guidance.situation import Detector, State
 from components.well_clear.relative_motion import nearly_equal
@@ -64,7 +70,7 @@ def violated(kind, number, step, intruder, volume):
         *(intruder[i] + intruder[3 + i] * time_s for i in range(3)),
         *(intruder[3 + i] + 0.0 * time_s for i in range(3)),
     )
-    return bool(violates(volume, own.less(moved)).any())
+    return bool(violates(volume, own.relative_to(moved)).any())
 
 
 @pytest.mark.parametrize("variable", ["modified_tau", "time_to_closest", "none"])
@@ -78,7 +84,7 @@ def test_both_sides_of_every_edge_are_as_they_are_flown(kind, variable):
     for intruder in (CROSSING, BELOW, NEAR):
         values = {**VALUES, "lookahead_time": LOOKAHEAD_S}
         made = kind_of(kind, one_row(OWN), values)
-        conflicts = made.against(one_row(intruder).columns(), Detector(volume))
+        conflicts = made.find_conflicts(one_row(intruder).columns(), Detector(volume))
         clear = ~conflicts.unsafe(0.0, HORIZON_S)[0]
         zero = int(np.argmin(np.abs(made.values[0] - made.own_value)))
         for place in np.flatnonzero(clear[1:] != clear[:-1]):
@@ -95,7 +101,7 @@ def test_flights_to_altitudes_are_smooth_and_end_there():
     for climb in (-9.0, -1.0, 0.0, 2.0, 9.0):
         own = State(*OWN[:5], np.float64(climb))
         made = Altitudes(one_row(own), {**VALUES, "lookahead_time": 1e6})
-        targets = made.chosen(made.values)[0]
+        targets = made.select_examined(made.values)[0]
         assert targets == pytest.approx(made.values[0])  # within so long a time, all differ
         t1, t2, t3 = (part[0] for part in (made.accelerated_s, made.held_s, made.level_s))
         assert (t1 <= t2 + 1e-12).all()
@@ -124,13 +130,17 @@ def test_altitudes_that_others_stand_for_are_flown_like_them(climb, up):
     own = State(*(np.array([part]) for part in (0.0, 0.0, up, 30.0, -40.0, climb)))
     made = Altitudes(own, {**VALUES, "lookahead_time": 60.0})
     every = Altitudes(own, {**VALUES, "lookahead_time": 1e6})
-    assert made.of_all(np.ones((1, made.chosen(made.values).shape[1]), dtype=bool)).all()
-    assert made.chosen(made.values).shape[1] < every.chosen(every.values).shape[1]
+    assert made.spread_to_all(
+        np.ones((1, made.select_examined(made.values).shape[1]), dtype=bool)
+    ).all()
+    assert made.select_examined(made.values).shape[1] < every.select_examined(every.values).shape[1]
     for time_s in (0.0, 0.7, 5.0, 31.0, 60.0):
         few = made.flight_at(np.full((1, 1), time_s))
         all_of_them = every.flight_at(np.full((1, 1), time_s))
         for name in ("up_m", "climb_mps"):
-            assert made.of_all(getattr(few, name)) == pytest.approx(getattr(all_of_them, name))
+            assert made.spread_to_all(getattr(few, name)) == pytest.approx(
+                getattr(all_of_them, name)
+            )
 
 
 def test_a_clear_value_alone_makes_no_band():
@@ -154,7 +164,7 @@ def test_worse_regions_are_painted_over_milder_ones():
     mild = [Interval(0.0, 2.0), Interval(8.0, 10.0)]
     worse = [Interval(0.0, 4.0), Interval(6.0, 10.0)]
     layers = [("MID", mild, True), ("NEAR", worse, True)]
-    assert painted(layers, 0.0, 10.0) == [
+    assert paint_bands(layers, 0.0, 10.0) == [
         (0.0, 2.0, "NONE"), (2.0, 4.0, "MID"), (4.0, 6.0, "NEAR"), (6.0, 8.0, "MID"),
         (8.0, 10.0, "NONE"),
     ]  # fmt: skip
@@ -177,7 +187,7 @@ def test_the_nearer_way_out_is_preferred_and_right_where_they_are_equal():
     ("one", "other", "same"), [(1.0, 1.0001, True), (1.0, 1.001, False), (0.0, 9e-6, True)]
 )
 def test_places_are_the_same_within_a_tolerance(one, other, same):
-    assert same_place(one, other) is same
+    assert is_same_value(one, other) is same
 
 
 @given(
@@ -187,4 +197,4 @@ def test_places_are_the_same_within_a_tolerance(one, other, same):
 )
 def test_places_of_two_numbers_are_those_of_arrays(one, part, away):
     other = one * (1.0 + part) + away
-    assert same_place(one, other) is bool(nearly_equal(one, other, 2**40, 1e-5))
+    assert is_same_value(one, other) is bool(nearly_equal(one, other, 2**40, 1e-5))

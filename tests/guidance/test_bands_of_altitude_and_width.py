@@ -62,7 +62,7 @@ def test_altitudes_on_both_sides_of_every_edge_are_as_they_are_flown(climb):
     edges = 0
     for intruder in (CROSSING, BELOW, NEAR, ABOVE):
         made = kind_of("alt", one_row(own), values)
-        conflicts = made.against(one_row(intruder).columns(), Detector(volume))
+        conflicts = made.find_conflicts(one_row(intruder).columns(), Detector(volume))
         clear = ~conflicts.unsafe(0.0, LOOKAHEAD_S)[0]
         for place in np.flatnonzero(clear[1:] != clear[:-1]):
             for at in (place, place + 1):
@@ -76,7 +76,7 @@ def test_altitudes_on_both_sides_of_every_edge_are_as_they_are_flown(climb):
                     *(intruder[i] + intruder[3 + i] * time_s for i in range(3)),
                     *(intruder[3 + i] + 0 * time_s for i in range(3)),
                 )
-                relative = flown.less(other)
+                relative = flown.relative_to(other)
                 # Flown in steps, and looked at by whole seconds on the way: sizes 2 % off.
                 larger, smaller = (Volume(*(s * k for s in SIZES), "none") for k in (1.02, 0.98))
                 if clear[at]:
@@ -94,7 +94,7 @@ def test_altitudes_that_are_taken_at_once_meet_who_is_level_with_them_while_near
     values = {**VALUES, "lookahead_time": LOOKAHEAD_S, at_once: 0.0}
     made = kind_of("alt", one_row(OWN), values)
     volume = Volume(*SIZES, "none")
-    conflicts = made.against(one_row(intruder).columns(), Detector(volume))
+    conflicts = made.find_conflicts(one_row(intruder).columns(), Detector(volume))
     found = conflicts.unsafe(0.0, LOOKAHEAD_S)[0]
     time_s = np.linspace(0.0, LOOKAHEAD_S, 200_001)
     east, north, up = (float(intruder[i]) + float(intruder[3 + i]) * time_s for i in range(3))

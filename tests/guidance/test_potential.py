@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from components.guidance.mvp import _dense
-from components.guidance.potential import KeptApart, Others, conflicts, may_resume, pushed
+from components.guidance.potential import KeptApart, Others, conflicts, may_resume, push_velocity
 
 KEPT = KeptApart(50.0, 1.05, 120.0)
 
@@ -59,7 +59,7 @@ def drawn(seed, n=400, others=3):
 def test_all_three_follow_the_formulas_pair_by_pair():
     others, own = drawn(1)
     now, done = conflicts(others, KEPT), may_resume(others, own, KEPT)
-    out = pushed(others, own, now, KEPT)
+    out = push_velocity(others, own, now, KEPT)
     assert 0.2 < now.mean() < 0.8 and 0.02 < done.mean() < 0.8
     for k in range(own.shape[1]):
         x, y = own[:, k].tolist()
@@ -80,8 +80,8 @@ def one(rx, ry, ux, uy):
 def test_two_head_on_turn_to_the_same_side_and_miss_by_the_larger_radius():
     mine, theirs = np.array([[0.0], [10.0]]), np.array([[0.0], [-10.0]])
     push = np.array([[True]])
-    a = pushed(one(0, 1450, 0, -20), mine, push, KEPT)[:, 0]
-    b = pushed(one(0, -1450, 0, 20), theirs, push, KEPT)[:, 0]
+    a = push_velocity(one(0, 1450, 0, -20), mine, push, KEPT)[:, 0]
+    b = push_velocity(one(0, -1450, 0, 20), theirs, push, KEPT)[:, 0]
     np.testing.assert_allclose(a, -b)  # each the other's image through the middle
     assert a[0] < 0.0  # to the left of the line, for both
     # By one alone the line touches the circle of 52.5 m, less what a tenth of a metre is off.
@@ -91,7 +91,9 @@ def test_two_head_on_turn_to_the_same_side_and_miss_by_the_larger_radius():
 
 @pytest.mark.parametrize("offset_m", [-40.0, -5.0, 5.0, 40.0])
 def test_who_passes_on_one_side_is_given_more_room_there(offset_m):
-    out = pushed(one(offset_m, 1000, 0, -20), np.array([[0.0], [10.0]]), np.array([[True]]), KEPT)
+    out = push_velocity(
+        one(offset_m, 1000, 0, -20), np.array([[0.0], [10.0]]), np.array([[True]]), KEPT
+    )
     assert np.sign(out[0, 0]) == -np.sign(offset_m)
     u = np.array([0.0, -10.0]) - out[:, 0]
     miss_m = abs(offset_m * u[1] - 1000.0 * u[0]) / math.hypot(*u)
@@ -103,7 +105,7 @@ def test_inside_already_the_push_is_what_is_missing_of_the_radius():
     side, along = 12.0, math.sqrt(30.0**2 - 12.0**2)
     inside = one(side, along, 0, -along)
     assert conflicts(inside, KEPT).all()
-    out = pushed(inside, np.array([[3.0], [4.0]]), np.array([[True]]), KEPT)
+    out = push_velocity(inside, np.array([[3.0], [4.0]]), np.array([[True]]), KEPT)
     np.testing.assert_allclose(out[:, 0], [3.0 - 40.5, 4.0])
 
 

@@ -94,10 +94,10 @@ def test_who_seems_to_be_in_reach_is_within_the_true_reach(model: str) -> None:
 def test_nothing_is_proven_at_a_pole_and_the_exact_form_needs_no_proof() -> None:
     look, envelope = FarthestLook(15e3), SimpleNamespace()
     assert true_reach_m("flat_earth", 15e3, (89.95, 89.99), (0.0, 100.0)) == math.inf
-    offer = KnownTraffic(Roster.of([]), lambda _reach, _lasts: envelope)
+    offer = KnownTraffic(Roster.from_pairs([]), lambda _reach, _lasts: envelope)
     context: Any = SimpleNamespace(producers=[SimpleNamespace(offer=offer)])
     assert seeming_look(context, "flat_earth", look).seeming == (("flat_earth", 15e3),)
     assert seeming_look(context, "ellipsoid", look) == look
-    assert not offer.asked
+    assert not offer.was_asked
     unknown: Any = SimpleNamespace(producers=[SimpleNamespace(offer=None)])
     assert seeming_look(unknown, "flat_earth", look) == FarthestLook(math.inf)

@@ -9,9 +9,9 @@ from same_runs import same_as_alone
 from components.radar.swerling import SwerlingRadar
 from components.radar.weather import Rain
 from components.tracking.stub import TrackerStub
-from dsa_des.arrays.run_ticks import no_runs
+from dsa_des.arrays.run_ticks import runs_of_single
 from dsa_des.block.component import Component, Input
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.errors import BlockFailure
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import lock_step
@@ -138,7 +138,7 @@ class Unsaid(CountingByRun):
 
     def run(self, wake):
         tracks = super().run(wake)
-        return None if tracks is None else tracks.of_runs(no_runs(len(tracks)))
+        return None if tracks is None else tracks.of_runs(runs_of_single(len(tracks)))
 
 
 def with_tracker(tmp_path, kind):
@@ -185,7 +185,7 @@ def test_a_class_speaks_for_those_of_its_package():
 
 
 def test_no_block_repeats_what_its_base_says_of_replicas():
-    for point in registered().values():
+    for point in entry_points_of().values():
         for cls in point.load().__mro__:
             said = [vars(base)["lockstep"] for base in cls.__mro__ if "lockstep" in vars(base)]
             assert said[:2] != [True, True] or not cls.__module__.startswith("components"), cls

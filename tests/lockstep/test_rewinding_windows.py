@@ -144,7 +144,7 @@ def test_blocks_that_no_loop_leads_to_run_ahead(cued):
             found = super().run_window(window)
             for name in calls:
                 node = self.nodes[name]
-                calls[name] += node._end_in(window) > window.start
+                calls[name] += node._window_end(window) > window.start
             return found
 
     simulation = Counted(cued, recorder=Recorder([sink := MemorySink()]))

@@ -141,7 +141,7 @@ def test_what_is_under_way_at_the_end_does_not_come(tmp_path):
         @staticmethod
         def run(wake):
             came.extend(
-                together.runs.before_ends(new.instants) for new in wake.arrivals("detections")
+                together.runs.is_before_ends(new.instants) for new in wake.arrivals("detections")
             )
             return runner.run(wake)
 

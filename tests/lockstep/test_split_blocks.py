@@ -13,7 +13,7 @@ from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lockstep import NotInLockStep, lock_step
-from dsa_des.replicas.replicas import Recorded, run_replicas, why_apart
+from dsa_des.replicas.replicas import Recorded, lock_step_refusal, run_replicas
 from dsa_des.replicas.split_block import SplitBlock, _part
 from dsa_des.scene.scene import load_scene
 
@@ -68,7 +68,7 @@ def test_a_clock_in_some_replicas_only_is_run_one_by_one():
     _, alone = tables_of(scene_of(scene, replicas[1]))
     got, wanted = outcomes[1].tables["detections"]["tick"], alone["detections"]["tick"]
     assert got.tolist() == wanted.to_pylist()
-    assert "in some replicas only" in why_apart(scene, replicas)
+    assert "in some replicas only" in lock_step_refusal(scene, replicas)
 
 
 DELAYED = (

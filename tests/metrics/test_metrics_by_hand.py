@@ -9,15 +9,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components.metrics.losses import closest, first_inside, first_losses_s, nearest_of, ways_of
+from components.metrics.losses import (
+    closest,
+    first_losses_s,
+    first_times_inside,
+    nearest_of,
+    ways_of,
+)
 from components.metrics.separation import Separation, distances_m, separations
 from components.well_clear.volume import PRESETS
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.message import Text
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import run_replicas
 from dsa_des.scene.scene import load_scene
-from dsa_des.studies.metric import METRICS, Group, wanted_by
+from dsa_des.studies.metric import METRICS, Group, columns_wanted
 from dsa_des.studies.study import MetricSpec
 
 WELL_CLEAR_M, NMAC_M = (
@@ -159,7 +165,7 @@ def test_what_is_measured_of_recorded_rows_is_as_by_hand(
         for k, tables in enumerate(RUNS)
     ]
     replicas = [Replica(k) for k in range(len(runs))]
-    found = metric.measure(Group(scene, replicas, runs, wanted_by([metric])))
+    found = metric.measure(Group(scene, replicas, runs, columns_wanted([metric])))
     assert found.keys() == wanted.keys()
     for key, values in wanted.items():
         if found[key].dtype == object:
@@ -181,7 +187,7 @@ def test_flights_together_are_as_each_alone(small: Path) -> None:
     found = first_losses_s(flights, WELL_CLEAR_M, NMAC_M)
     for flight, (lost_s, _) in zip(flights[:3], found.tolist(), strict=False):
         times = np.arange(0.0, flight.end_s, 1e-3)
-        apart = flight.at(times)
+        apart = flight.separation_at(times)
         inside = (apart.horizontal_m < WELL_CLEAR_M[0]) & (apart.vertical_m < WELL_CLEAR_M[1])
         assert lost_s == pytest.approx(times[np.argmax(inside)], abs=2e-3)
     assert np.isnan(found[3]).all()
@@ -197,7 +203,7 @@ def test_distances_of_f3442_are_exclusive() -> None:
     inside = Separation("x", np.arange(3.0), np.full(3, 700.0), np.array([609.6, 609.5, 0.0]),
                         np.array([0.0, 76.2, 76.1]))  # fmt: skip
     flight = SimpleNamespace(pieces=lambda: iter([inside]), between_samples=False)
-    lost, never = first_inside(flight, WELL_CLEAR_M, (1.0, 0.5))
+    lost, never = first_times_inside(flight, WELL_CLEAR_M, (1.0, 0.5))
     assert lost == 2.0
     assert np.isnan(never)
 
@@ -209,8 +215,8 @@ def test_a_loss_of_the_smaller_volume_is_looked_for_after_that_of_the_larger() -
         for k, far_m in enumerate(np.array([[900.0, 600.0], [500.0, 400.0], [150.0, 140.0]]))
     ]
     flight = SimpleNamespace(pieces=lambda: iter(pieces), between_samples=False)
-    assert first_inside(flight, WELL_CLEAR_M, NMAC_M) == [1.0, 4.0]
-    assert first_inside(flight, NMAC_M, WELL_CLEAR_M) == [4.0, 1.0]
+    assert first_times_inside(flight, WELL_CLEAR_M, NMAC_M) == [1.0, 4.0]
+    assert first_times_inside(flight, NMAC_M, WELL_CLEAR_M) == [4.0, 1.0]
 
 
 def test_distances_do_not_depend_on_the_pieces_they_come_in(
@@ -221,7 +227,7 @@ def test_distances_do_not_depend_on_the_pieces_they_come_in(
     def found() -> tuple[Any, ...]:
         (flight,) = separations(scene, 0.13)
         time_s = np.concatenate([piece.time_s for piece in flight.pieces()])
-        return time_s.tolist(), closest(flight), first_inside(flight, WELL_CLEAR_M, NMAC_M)
+        return time_s.tolist(), closest(flight), first_times_inside(flight, WELL_CLEAR_M, NMAC_M)
 
     whole = found()
     assert len(whole[0]) > 1000  # the grid and the samples of the source
@@ -280,11 +286,11 @@ OF_OTHERS = {
 KEYS = {"track_errors_by_range": {"from_s": 1.0, "ranges_nmi": [2.4, 2.6]}}
 
 
-@pytest.mark.parametrize("name", sorted(registered(METRICS).keys() - ELSEWHERE))
+@pytest.mark.parametrize("name", sorted(entry_points_of(METRICS).keys() - ELSEWHERE))
 def test_a_group_measures_what_its_runs_measure_alone(small: Path, name: str) -> None:
     scene = load_scene(OF_OTHERS[name](small) if name in OF_OTHERS else "small.toml")
     metric = MetricSpec(name, KEYS.get(name, {})).build(scene)
-    wanted = wanted_by([metric])
+    wanted = columns_wanted([metric])
     replicas = [
         Replica(k, {"blocks.traffic.intruders[0].east_m": 60.0 * k, "blocks.ir.offset_s": k / 16})
         for k in range(5)
@@ -321,8 +327,8 @@ def test_an_old_detection_that_comes_late_makes_nothing_older(small: Path) -> No
     Path("late.toml").write_text(text)
     scene = load_scene("late.toml")
     metric = MetricSpec("age_of_information").build(scene)
-    recorded = run_replicas(scene, [Replica(1)], wanted=wanted_by([metric]))
-    found = metric.measure(Group(scene, [Replica(1)], recorded, wanted_by([metric])))
+    recorded = run_replicas(scene, [Replica(1)], wanted=columns_wanted([metric]))
+    found = metric.measure(Group(scene, [Replica(1)], recorded, columns_wanted([metric])))
     assert found["age_of_information_mean_s"] == pytest.approx([0.25])
     assert found["age_of_information_p95_s"] == pytest.approx([0.475])
 

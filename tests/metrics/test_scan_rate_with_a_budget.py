@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import dsa_des
-from components.radar.detection import first_declared
+from components.radar.detection import first_declaration_probability
 from docs.make import scan_rate as page
 from docs.make.declaration_ranges import certain_range_m, mean_range_m
 
@@ -23,17 +23,17 @@ def test_a_declaration_s_chances_are_those_of_all_histories(m, n):
             if history[look] and sum(history[max(0, look - n + 1) : look + 1]) >= m:
                 expected[look] += chance
                 break
-    assert first_declared(pd, m, n) == pytest.approx(expected, abs=1e-14)
-    both = first_declared(np.stack([pd, pd[::-1]]), m, n)
+    assert first_declaration_probability(pd, m, n) == pytest.approx(expected, abs=1e-14)
+    both = first_declaration_probability(np.stack([pd, pd[::-1]]), m, n)
     assert both[0] == pytest.approx(expected, abs=1e-14)
 
 
 def test_a_rule_or_a_probability_that_cannot_be_is_refused():
     for m, n in ((0, 1), (3, 2), (1, 13)):
         with pytest.raises(ValueError, match="m is"):
-            first_declared([0.5], m, n)
+            first_declaration_probability([0.5], m, n)
     with pytest.raises(ValueError, match=r"pd\[1\] is 1.5|pd is 1.5|1\.5"):
-        first_declared([0.5, 1.5])
+        first_declaration_probability([0.5, 1.5])
 
 
 def test_a_budget_of_time_has_a_best_scan_rate_and_a_free_scan_has_none():

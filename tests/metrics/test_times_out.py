@@ -116,7 +116,7 @@ def test_each_run_is_out_when_its_simulation_is_whatever_runs_beside_it(conf):
         simulation = Simulation(one)
         simulation.run()
         ticks = np.arange(0, simulation.runs.run_ticks, simulation.ticks_per_s // 100)
-        up = simulation.timeline.outages("radar").up(RunTicks.of_run(0, ticks))
+        up = simulation.timeline.outages("radar").is_up(RunTicks.of_run(0, ticks))
         time_s = ticks / simulation.ticks_per_s
         up &= (time_s < 3) | (time_s >= 9)
         inside = ((time_s[:, None] >= spans[:, 0]) & (time_s[:, None] < spans[:, 1])).any(axis=1)

@@ -40,7 +40,7 @@ class Person(Desk):
 
     def take(self, time_s):
         while self.acts and self.acts[0][0] <= time_s:
-            self.put(PendingDecision(self.acts.pop(0)[1], self.told.append))
+            self.submit(PendingDecision(self.acts.pop(0)[1], self.told.append))
         return super().take(time_s)
 
 
@@ -244,11 +244,11 @@ def test_what_is_no_table_of_decisions_is_refused(tmp_path, text, says):
 def test_a_desk_takes_no_more_than_a_person_lays_down():
     desk = Desk()
     decision = PendingDecision(OperatorDecision(SHOWN), print)
-    accepted = [desk.put(decision) for _ in range(MOST_WAITING + 2)]
+    accepted = [desk.submit(decision) for _ in range(MOST_WAITING + 2)]
     assert accepted == [True] * MOST_WAITING + [False] * 2
     assert desk.take(1.5) == [decision] * MOST_WAITING and desk.take(2.5) == []
-    assert desk.put(decision)
-    assert len(desk.close()) == 1 and not desk.put(decision)
+    assert desk.submit(decision)
+    assert len(desk.close()) == 1 and not desk.submit(decision)
 
 
 def test_without_a_person_nothing_is_decided_and_it_says_so(tmp_path):

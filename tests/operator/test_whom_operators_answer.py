@@ -9,7 +9,7 @@ from test_avoidance_by_bands import scene as by_bands
 from test_operator import scene as stochastic
 from wired import rows, run
 
-from components.guidance.daidalus import changes_out
+from components.guidance.daidalus import changes_out_of_bands
 
 
 def test_each_decision_answers_the_alert_of_its_own_target(tmp_path):
@@ -115,8 +115,8 @@ def test_ways_out_of_many_instants_are_those_of_each(tmp_path, monkeypatch):
     import components.avoidance as daidalus
 
     kept = []
-    monkeypatch.setattr(daidalus, "changes_out", lambda *given: kept.append(given) or
-                        changes_out(*given))  # fmt: skip
+    monkeypatch.setattr(daidalus, "changes_out_of_bands", lambda *given: kept.append(given) or
+                        changes_out_of_bands(*given))  # fmt: skip
     loop = by_bands(tmp_path, level=1)
     loop["wires"] = loop["wires"][:1]
     run(loop)
@@ -124,6 +124,6 @@ def test_ways_out_of_many_instants_are_those_of_each(tmp_path, monkeypatch):
     places = [n for n, level in enumerate(alerts.highest()) if level][:12]
     assert len(places) == 12
     for kind in ("alt", "hdir"):
-        each = [changes_out(kind, configuration, alerter, alerts, [n])[0] for n in places]
-        assert changes_out(kind, configuration, alerter, alerts, places) == each
+        each = [changes_out_of_bands(kind, configuration, alerter, alerts, [n])[0] for n in places]
+        assert changes_out_of_bands(kind, configuration, alerter, alerts, places) == each
         assert len(set(each)) > 3

@@ -72,7 +72,7 @@ def test_a_field_of_view_is_drawn_where_its_platform_starts():
     """One that looks 10° to both sides along its course to the west, 8 km, from 6.2 km east."""
     simulation = Simulation(dsa_des.load_scene("one_is_blind"))
     simulation.run()
-    flights = Flights.of(simulation, {})
+    flights = Flights.from_simulation(simulation, {})
     yaw_rad, start_km = flights.start_of("other")
     assert np.degrees(yaw_rad) % 360.0 == pytest.approx(270.0, abs=0.1)
     assert start_km == pytest.approx((6.2, 6.0), abs=0.01)

@@ -74,7 +74,9 @@ def seen_from(simulation: Any, own: Any, target: int, time_s: float) -> tuple[fl
     """Return the azimuth and range of a target at a time, if the ownship flies like this."""
     traffic, transform = simulation.components["traffic"], simulation.components["transform"]
     flights = (own, traffic.targets[target])
-    seen = transform._revisited(*(flight.at(np.array([[time_s]])) for flight in flights))
+    seen = transform._columns_at_other_instants(
+        *(flight.at(np.array([[time_s]])) for flight in flights)
+    )
     return seen["body_azimuth_rad"][0, 0], seen["range_m"][0, 0]
 
 
@@ -114,7 +116,7 @@ def test_a_scan_follows_the_flight_that_is_known_when_it_begins(
     flights: list[Any] = [SteeredFlight(traffic.own.flight)]
     for order, at_s in zip(orders, came_s, strict=True):
         turn = Manoeuvre(order["turn_rad"], order["rate_rad_s"])
-        flights.append(flights[-1].steered(at_s, turn))
+        flights.append(flights[-1].add_manoeuvre(at_s, turn))
     compared = under_way = 0
     for row in tables["detections"].to_pylist():
         scan_s, lit_s = float(row["scan"]), row["illuminated_s"]

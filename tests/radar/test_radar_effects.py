@@ -198,7 +198,7 @@ def test_targets_that_are_not_offered(scene, monkeypatch):
     plan = plan_of(path)
     assert plan["RCS fluctuation"].because == plan["aspect RCS"].because == because
     assert same(offered, simulate(path)[1])
-    others = KnownTraffic(Roster.of([("somebody else", Aircraft())]), None)
+    others = KnownTraffic(Roster.from_pairs([("somebody else", Aircraft())]), None)
     monkeypatch.setattr(TrafficSource, "offer", lambda self, port: others)
     with pytest.raises(BlockFailure, match="not offered"):
         simulate(path)

@@ -34,7 +34,7 @@ def cells_of(crafts, scans, *, range_m=6000.0, heading=math.pi, pitch=0.0, roll=
     """Cells of level targets that come towards us, one per scan and target."""
     shape = (scans, len(crafts))
     azimuth = np.zeros(shape)
-    roster = Roster.of([(f"target {i}", craft) for i, craft in enumerate(crafts)])
+    roster = Roster.from_pairs([(f"target {i}", craft) for i, craft in enumerate(crafts)])
     targets = RelativeTargets(
         tick=np.arange(scans),
         azimuth_rad=azimuth,
@@ -95,7 +95,7 @@ def test_mixed_models_draw_as_if_each_target_were_alone():
     for index, craft in enumerate(crafts):
         alone = cells_of([craft], 50)
         # Draws are keyed by the target's name.
-        alone.roster = Roster.of([(f"target {index}", craft)])
+        alone.roster = Roster.from_pairs([(f"target {index}", craft)])
         look = radar.look(alone)
         chosen = together.target == index
         for name in ("snr_db", "detection_probability"):

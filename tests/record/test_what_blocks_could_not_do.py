@@ -12,12 +12,12 @@ from same_runs import replicas_of
 from wired import SEES_ALL, chain
 
 import dsa_des
-from components.fusion.pick_best import least_apart_s
+from components.fusion.pick_best import closest_clock_distance_s
 from components.guidance.mvp import VoltagePotential
 from components.messages.reach import FarthestLook
 from components.surveillance.exchange import PositionExchange
-from dsa_des.block.entry_points import registered
-from dsa_des.record.undone import Tries, added
+from dsa_des.block.entry_points import entry_points_of
+from dsa_des.record.undone import Tries, add_counts
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
@@ -89,7 +89,7 @@ def steered(found: dict[str, Any], by: str, **keys: Any) -> dict[str, Any]:
 
 
 def test_every_type_of_block_was_looked_at() -> None:
-    assert set(SAID) == set(registered("dsa_des.components"))
+    assert set(SAID) == set(entry_points_of("dsa_des.components"))
 
 
 @pytest.mark.parametrize("fusion", ["fusion.pick_best", "fusion.gated"])
@@ -109,7 +109,7 @@ def test_a_fusion_whose_sensors_never_meet_is_counted_by_runs(fusion: str) -> No
     )
     once = {"blocks.eye.offset_s": 0}
     together = replicas_of(dsa_des.load_scene(found), {}, once, {})
-    assert lock_step(together).run().undone == added(map(undone, together))
+    assert lock_step(together).run().undone == add_counts(map(undone, together))
     assert undone(together[1])["fusion"] == {NOT_TOGETHER: (0, 1)}
     alone = scene({"radar": RADAR}, fusion={"type": fusion})
     assert "fusion" not in undone(alone) and not any("never" in note for note in notes(alone))
@@ -127,7 +127,7 @@ def test_how_near_two_clocks_come_is_found_among_their_instants(
     first, second = ([Fraction(x) for x in clock] for clock in (one, other))
     instants = [[clock[0] + k * clock[1] for k in range(60)] for clock in (first, second)]
     by_hand = min(abs(a - b) for a in instants[0] for b in instants[1])
-    assert least_apart_s(tuple(first), tuple(second)) == by_hand == Fraction(apart_s)
+    assert closest_clock_distance_s(tuple(first), tuple(second)) == by_hand == Fraction(apart_s)
 
 
 def test_trackers_whose_tracks_are_of_others_are_counted() -> None:
@@ -223,7 +223,7 @@ def test_a_tracker_that_never_has_a_track_is_counted(tracker: str, what: str) ->
                  tracker={"type": tracker})  # fmt: skip
     assert undone(seen)["tracker"][what] == (0, 1)
     runs = replicas_of(dsa_des.load_scene(found), {}, {})
-    assert lock_step(runs).run().undone == added(map(undone, runs))
+    assert lock_step(runs).run().undone == add_counts(map(undone, runs))
 
 
 @pytest.mark.parametrize(
@@ -298,8 +298,8 @@ def test_who_finds_no_way_out_is_counted(pilot: str, tmp_path: Path) -> None:
 
 
 def test_tries_of_runs_add_up_whatever_comes_when() -> None:
-    tries = Tries().with_more(np.array([0, 2, 2]), np.array([1, 1, 2]), np.array([False] * 3))
-    tries = tries.with_more(np.array([4, 4, 0]), np.array([1, 2, 1]), np.arange(3) == 1)
+    tries = Tries().add_tries(np.array([0, 2, 2]), np.array([1, 1, 2]), np.array([False] * 3))
+    tries = tries.add_tries(np.array([4, 4, 0]), np.array([1, 2, 1]), np.arange(3) == 1)
     # Run 2, of 2 and 4; 0 and 2, of 0, 2 and 4.
     assert tries.undone("x", of_two=True)["x"].tolist() == [[0, 0, 1, 0, 0], [0, 0, 1, 0, 1]]
     assert tries.undone("x")["x"].tolist() == [[1, 0, 1, 0, 0], [1, 0, 1, 0, 1]]

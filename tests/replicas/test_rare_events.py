@@ -15,7 +15,7 @@ from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.splitting import FlownRuns, chosen_of, find_levels, repeated
+from dsa_des.replicas.splitting import FlownRuns, chosen_of, find_levels, run_repetitions
 from dsa_des.results.statistics import rare
 from dsa_des.studies.chunk import run_chunk
 from dsa_des.studies.study_file import read_study
@@ -56,7 +56,9 @@ def test_levels_are_reached_by_a_fifth_of_the_runs_of_a_stage():
 def of_many(repetitions):
     """The estimates of some repetitions of a probability of 3.7e-5."""
     levels = (*range(LAST - 3, -1, -3), 0.0)
-    found = repeated([roots(n) for n in range(repetitions)], [*range(repetitions)], levels, chain)
+    found = run_repetitions(
+        [roots(n) for n in range(repetitions)], [*range(repetitions)], levels, chain
+    )
     assert {one.flown for one in found if one.probability} == {50 * len(levels)}
     return np.array([one.probability for one in found])
 
@@ -86,7 +88,7 @@ def test_a_repetition_s_share_is_the_product_of_its_stages(comes: bool) -> None:
         reached[0, some] = 2.5
         return FlownRuns(reached, np.ones(len(runs)), [None] * len(runs))
 
-    (found,) = repeated([roots(0, 4)], [5], (7.0, 0.0), flown)
+    (found,) = run_repetitions([roots(0, 4)], [5], (7.0, 0.0), flown)
     assert found.flown == 8 and found.error is None
     # One branch more at the last stage stands for a quarter of a quarter.
     expected = (3 / 16, 3 / 64) if comes else (0.0, 1 / 16)
@@ -95,8 +97,8 @@ def test_a_repetition_s_share_is_the_product_of_its_stages(comes: bool) -> None:
 
 def test_repetitions_are_what_each_is_alone():
     levels = (14.0, 7.0, 0.0)
-    together = repeated([roots(n) for n in range(5)], [*range(5)], levels, chain)
-    alone = [repeated([roots(n)], [n], levels, chain)[0] for n in range(5)]
+    together = run_repetitions([roots(n) for n in range(5)], [*range(5)], levels, chain)
+    alone = [run_repetitions([roots(n)], [n], levels, chain)[0] for n in range(5)]
     assert together == alone
 
 
@@ -110,14 +112,14 @@ def test_weights_of_the_first_runs_count():
         odd = np.array([run.seed % 2 == 1 for run in runs])
         return FlownRuns(np.where(odd, np.nan, said.reached_s), said.weights, said.errors)
 
-    found = repeated([roots(n) for n in range(60)], [*range(60)], (17.0, 14.0, 11.0), flown)
+    found = run_repetitions([roots(n) for n in range(60)], [*range(60)], (17.0, 14.0, 11.0), flown)
     p = np.array([one.probability for one in found])
     assert abs(p.mean() - 0.9 * STAYS**9) < 3.0 * p.std(ddof=1) / math.sqrt(len(p))
 
 
 def test_a_collapsed_repetition_is_none_that_is_dropped():
     # A stage of a probability of 0.6^14 that hardly any of 50 runs passes.
-    found = repeated([roots(n) for n in range(60)], [*range(60)], (14.0, 0.0), chain)
+    found = run_repetitions([roots(n) for n in range(60)], [*range(60)], (14.0, 0.0), chain)
     collapsed = [one for one in found if one.probability == 0.0]
     assert 20 < len(collapsed) < 60
     assert all(
@@ -157,7 +159,7 @@ def test_a_run_that_fails_fails_its_repetition_alone():
         errors = ["radar failed" if run.seed == 1003 else None for run in runs]
         return FlownRuns(said.reached_s, said.weights, errors)
 
-    found = repeated([roots(n) for n in range(3)], [0, 1, 2], (14.0, 0.0), failing)
+    found = run_repetitions([roots(n) for n in range(3)], [0, 1, 2], (14.0, 0.0), failing)
     assert [one.error for one in found] == [None, "radar failed", None]
     with pytest.raises(ValueError, match="of the pilot of splitting: radar failed"):
         find_levels(roots(1), 1, CANDIDATES, failing)

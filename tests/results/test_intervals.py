@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 
 from dsa_des.results import differences, statistics
-from dsa_des.results.labels import AxisName, axis_label, readable, signed, unit_of, value_label
-from dsa_des.results.printing import rounded
+from dsa_des.results.labels import (
+    AxisName,
+    axis_label,
+    format_with_interval,
+    readable,
+    unit_of,
+    value_label,
+)
+from dsa_des.results.printing import round_estimate
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.results.report import _line
 from dsa_des.results.summary import Line
@@ -77,9 +84,9 @@ def test_few_values_are_marked() -> None:
 def test_values_are_rounded_to_what_is_known(
     value: float, low: float, high: float, shown: tuple[str, str]
 ) -> None:
-    assert rounded(statistics.Estimate(value, low, high, 20, False)) == shown
+    assert round_estimate(statistics.Estimate(value, low, high, 20, False)) == shown
     starred = (shown[0], f"{shown[1]} *" if shown[1] else "")
-    assert rounded(statistics.Estimate(value, low, high, 3, True)) == starred
+    assert round_estimate(statistics.Estimate(value, low, high, 3, True)) == starred
 
 
 @pytest.mark.parametrize(
@@ -92,7 +99,7 @@ def test_values_are_rounded_to_what_is_known(
 def test_differences_are_written_to_two_digits_of_half_their_interval(
     value: float, half: float, shown: str
 ) -> None:
-    assert signed(value, half) == shown
+    assert format_with_interval(value, half) == shown
 
 
 def test_axes_of_figures_carry_units() -> None:

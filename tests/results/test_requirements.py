@@ -12,7 +12,7 @@ from dsa_des.errors import SceneError
 from dsa_des.results import figures
 from dsa_des.results.record import NUMBER, Requirement, Result
 from dsa_des.results.statistics import Estimate
-from dsa_des.results.summary import Line, answers, one_sided
+from dsa_des.results.summary import Line, answers, one_sided_confidence
 from dsa_des.studies.study_file import read_study
 
 ROOT = Path(__file__).parents[2]
@@ -63,7 +63,7 @@ def test_an_interval_of_too_few_values_meets_nothing() -> None:
 
 
 def test_one_end_of_an_interval_is_surer_than_both() -> None:
-    assert one_sided(0.95) == pytest.approx(0.975)
+    assert one_sided_confidence(0.95) == pytest.approx(0.975)
 
 
 STUDY = """\

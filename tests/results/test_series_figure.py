@@ -13,13 +13,13 @@ from dsa_des.results import curves
 from dsa_des.results.curves import draw_series
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.results.statistics import Estimate
-from dsa_des.results.summary import Line, of_series
+from dsa_des.results.summary import Line, results_of_series
 from dsa_des.results.tables import Tables
 
 
 def test_a_series_is_what_bears_a_number_in_its_order():
     names = ["a.t.10", "a.t.9", "a.t.x", "b.t.1", "a.t", "a.tt.3"]
-    assert list(of_series("a.t", names).items()) == [("a.t.9", 9.0), ("a.t.10", 10.0)]
+    assert list(results_of_series("a.t", names).items()) == [("a.t.9", 9.0), ("a.t.10", 10.0)]
 
 
 class Axes:

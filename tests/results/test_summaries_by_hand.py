@@ -9,7 +9,7 @@ from scipy import stats
 
 from dsa_des.commands.what_changed import ConditionPair, say_what_changed
 from dsa_des.costs.replay import median_and_spread
-from dsa_des.results.differences import _counted_apart, difference
+from dsa_des.results.differences import _estimate_by_shares, difference
 from dsa_des.results.record import NUMBER, SHARE, TRIALS, Result
 from dsa_des.results.statistics import rare
 from dsa_des.results.summary import compare_axis, summarise
@@ -126,7 +126,7 @@ def test_the_mean_of_rare_probabilities_by_hand() -> None:
 
 def test_shares_are_told_apart_as_if_one_more_had_been_counted_of_either_kind() -> None:
     """Of 4 runs 1 and 4: 2 of 6 and 5 of 6, whose variances are 2/9 and 5/36, over 6 each."""
-    found = _counted_apart(np.array([0.0, 1.0, 0.0, 0.0]), np.ones(4), 0.95)
+    found = _estimate_by_shares(np.array([0.0, 1.0, 0.0, 0.0]), np.ones(4), 0.95)
     half = 1.959964 * np.sqrt((2.0 / 9.0 + 5.0 / 36.0) / 6.0)
     assert (found.value, found.count, found.few) == (0.75, 4, True)
     assert (found.low, found.high) == pytest.approx((0.5 - half, 0.5 + half), rel=1e-6)

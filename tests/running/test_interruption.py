@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from dsa_des.terminal.interruption import Terminated, deferred, plain_ending
+from dsa_des.terminal.interruption import Terminated, defer_signals, plain_ending
 
 ENDS = [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
 
@@ -76,7 +76,7 @@ def test_other_ends_stay_as_they_are():
 
 def test_ignored_signals_stay_ignored(capsys):
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with plain_ending(), deferred():
+    with plain_ending(), defer_signals():
         signal.raise_signal(signal.SIGINT)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     assert capsys.readouterr().err == ""
@@ -86,7 +86,7 @@ def test_ignored_signals_stay_ignored(capsys):
 def test_a_step_that_must_not_be_halved_is_finished_first(number, code, word):
     done = []
     with pytest.raises(SystemExit) as ended, plain_ending():
-        with deferred(), deferred():
+        with defer_signals(), defer_signals():
             signal.raise_signal(number)
             signal.raise_signal(number)
             done.append("step")
@@ -95,7 +95,7 @@ def test_a_step_that_must_not_be_halved_is_finished_first(number, code, word):
 
 
 def test_an_error_of_the_step_itself_is_not_lost_when_no_signal_comes():
-    with pytest.raises(ValueError, match="mine"), deferred():
+    with pytest.raises(ValueError, match="mine"), defer_signals():
         raise ValueError("mine")
 
 
@@ -103,7 +103,7 @@ def test_a_thread_that_is_not_the_main_one_is_left_alone():
     passed = []
 
     def work():
-        with plain_ending(), deferred():
+        with plain_ending(), defer_signals():
             passed.append(True)
 
     thread = threading.Thread(target=work)

@@ -172,13 +172,13 @@ def test_of_many_detections_only_neighbours_are_compared(monkeypatch, sweeps):
         np.full(len(scan), 400.0),
     )  # fmt: skip
     asked = np.flatnonzero(scan >= 1)
-    compared, near = [], declaration._near
+    compared, near = [], declaration._is_same_place
 
     def counted(places, one, other, *rest):
         compared.append(len(one))
         return near(places, one, other, *rest)
 
-    monkeypatch.setattr(declaration, "_near", counted)
+    monkeypatch.setattr(declaration, "_is_same_place", counted)
     gates = {"speed_m_s": 100.0, "rate_rad_s": 0.02}
     found = scans_with_company(places, asked, 4, **gates)
     few = sum(compared)

@@ -101,7 +101,7 @@ class Runs:
         outcome = simulation.run()
         notes = notes_of(simulation.recorded_messages(), "", 1, simulation.ticks_per_s)
         return Made(
-            tables=notes.on(memory.tables()), plan=simulation.plan, simulation=simulation,
+            tables=notes.attach(memory.tables()), plan=simulation.plan, simulation=simulation,
             outcome=outcome,
         )  # fmt: skip
 

@@ -280,7 +280,7 @@ def test_a_run_folder_says_what_changed():
     assert there.stretches[0].scene.wires == late.stretches[0].scene.wires != late.wires
     again = dsa_des.load_scene(changed.resolved())
     assert again.stretches[0].from_s == Fraction(1, 3)
-    assert [one.written() for one in again.changes] == [one.written() for one in changed.changes]
+    assert [one.to_table() for one in again.changes] == [one.to_table() for one in changed.changes]
 
 
 def test_a_run_prints_what_changes_when(tmp_path):

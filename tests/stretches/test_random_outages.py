@@ -39,7 +39,7 @@ def test_times_between_failures_and_out_of_work_are_those_asked_for():
     # Exponential times: a share of 1/e lasts longer than the mean.
     assert (up > 50).mean() == pytest.approx(np.exp(-1), abs=4 * 0.5 / many**0.5)
     instants = RunTicks.of_run(0, np.arange(0, 100_000, 7))
-    down = ~outages.up(instants)
+    down = ~outages.is_up(instants)
     inside = np.zeros(len(down), dtype=bool)
     for first, last in spans_s(outages):
         inside |= (instants.tick >= first) & (instants.tick < last)
@@ -71,7 +71,7 @@ def test_what_comes_over_the_wires_of_a_block_that_is_out_is_lost():
     _, never = tables_of(scene(wires=late))
     arrived = scans_of(never["fused"])
     at = RunTicks.of_run(0, np.rint(np.array(arrived) * 1e9).astype(np.int64))
-    up = simulation.timeline.outages("fusion").up(at)
+    up = simulation.timeline.outages("fusion").is_up(at)
     assert 0.1 < up.mean() < 0.9
     assert tables["fused"].equals(never["fused"].filter(up))
 

@@ -134,7 +134,7 @@ class _Process:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         module = "dsa_des.studies.attempts"
-        monkeypatch.setattr(f"{module}.joined", lambda name, parts: self.sum(name, parts))
+        monkeypatch.setattr(f"{module}.join_pieces", lambda name, parts: self.sum(name, parts))
         monkeypatch.setattr(
             f"{module}.crashed_run", lambda study, chunk, tries: Done(chunk.name, b"", 1, 1, 1)
         )
@@ -146,13 +146,13 @@ class _Process:
 
     def all(self, *together: tuple[Chunk, ...], guilty: set[int]) -> list[Done]:
         attempts, found = Attempts(None, together), list[Done]()  # type: ignore[arg-type]
-        while (piece := attempts.next()) is not None:
+        while (piece := attempts.next_piece()) is not None:
             runs = [run for chunk in piece.chunks for run in chunk.runs]
             if {k for _, start, end in runs for k in range(start, end)} & guilty:
                 self.deaths += piece.chunks
-                found += attempts.lost(piece)
+                found += attempts.take_back(piece)
             else:
-                found += attempts.done(
+                found += attempts.finish(
                     piece, [Done(chunk.name, b"", len(chunk), 0) for chunk in piece.chunks]
                 )
         return found
@@ -181,13 +181,13 @@ def test_chunks_that_were_run_together_are_run_one_by_one(monkeypatch: pytest.Mo
 
 def test_a_last_try_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     attempts = Attempts(None, [(Chunk("a", ((0, 0, 1),)),), (Chunk("b", ((0, 1, 2),)),)])  # type: ignore[arg-type]
-    first, second = attempts.next(), attempts.next()
+    first, second = attempts.next_piece(), attempts.next_piece()
     assert first is not None and second is not None
-    attempts.lost(first)
-    assert attempts.next() is None  # the other one is still under way
-    attempts.done(second, [Done("b", b"", 1, 0)])
-    again = attempts.next()
-    assert again is not None and again.chunks[0].name == "a" and attempts.next() is None
+    attempts.take_back(first)
+    assert attempts.next_piece() is None  # the other one is still under way
+    attempts.finish(second, [Done("b", b"", 1, 0)])
+    again = attempts.next_piece()
+    assert again is not None and again.chunks[0].name == "a" and attempts.next_piece() is None
 
 
 def test_halves_hold_each_run_once() -> None:

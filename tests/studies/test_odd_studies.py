@@ -11,7 +11,7 @@ from dsa_des.cli import main
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import parse_draw
 from dsa_des.studies.study import Study
-from dsa_des.studies.study_tables import resolved
+from dsa_des.studies.study_tables import resolve_tables
 
 STUDY = """
 scene = "small.toml"
@@ -157,7 +157,7 @@ def test_cells_are_counted_like_a_product() -> None:
 @pytest.mark.parametrize("value", ["what?", "a*b", "[c]"])
 def test_text_that_looks_like_a_pattern_of_files_stays_text(tmp_path: Path, value: str) -> None:
     (tmp_path / "a*b").mkdir()
-    tables = {"axes": {"title": [SourcedText.of(value, tmp_path)]}}
-    assert resolved(tables, []) == {"axes": {"title": [value]}}
-    files = {"axes": {"file": {"files": SourcedText.of("a*.daa", tmp_path)}}}
-    assert resolved(files, [])["axes"]["file"]["files"] == str(tmp_path.resolve() / "a*.daa")
+    tables = {"axes": {"title": [SourcedText.from_text(value, tmp_path)]}}
+    assert resolve_tables(tables, []) == {"axes": {"title": [value]}}
+    files = {"axes": {"file": {"files": SourcedText.from_text("a*.daa", tmp_path)}}}
+    assert resolve_tables(files, [])["axes"]["file"]["files"] == str(tmp_path.resolve() / "a*.daa")

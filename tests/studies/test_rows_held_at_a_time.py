@@ -10,7 +10,7 @@ from dsa_des.replicas.replicas import run_replicas
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies import chunk as chunks
 from dsa_des.studies.chunk import run_chunk
-from dsa_des.studies.metric import Group, one_by_one
+from dsa_des.studies.metric import Group, measure_one_by_one
 from dsa_des.studies.study import Chunk
 from dsa_des.studies.study_file import study_of_tables
 
@@ -42,12 +42,12 @@ def test_parts_of_a_chunk_give_its_bytes(small: Path, monkeypatch: pytest.Monkey
         except ValueError as error:
             if len(runs) == 1:
                 return {}, {0: str(error)}
-            return one_by_one(partial(broken, scene, metrics), runs)
+            return measure_one_by_one(partial(broken, scene, metrics), runs)
 
-    plain = chunks._measured
+    plain = chunks._measure
     monkeypatch.setattr(chunks, "run_replicas", run)
     monkeypatch.setattr(chunks, "Group", made)
-    monkeypatch.setattr(chunks, "_measured", broken)
+    monkeypatch.setattr(chunks, "_measure", broken)
     whole = run_chunk(study, Chunk("part", ((0, 0, 16),)))
     assert recorded == [16] and 0 < whole.failed < 16
     monkeypatch.setattr(chunks, "_MOST_BYTES", 15e3)

@@ -58,7 +58,7 @@ def test_a_ratio_ends_a_study_by_its_weighted_interval(monkeypatch: pytest.Monke
                 stop_when=SimpleNamespace(metric="r", half_width=half * factor),
                 confidence=confidence, interval="t",
             )  # fmt: skip
-            assert runner._satisfied(study, folder, 2) == ended  # type: ignore[arg-type]
+            assert runner._satisfied_cells(study, folder, 2) == ended  # type: ignore[arg-type]
 
 
 def test_a_run_is_repeated_and_measured_with_all_that_was_drawn_and_set(

@@ -17,7 +17,12 @@ from components.surveillance.altimetry import (
     standard_laplace,
 )
 from components.surveillance.broadcast import CORRELATION_TIME_S, Broadcasts, Transponders
-from components.surveillance.reception import DO_365_IN_1_S, LAWS, do_365, fitted
+from components.surveillance.reception import (
+    DO_365_IN_1_S,
+    LAWS,
+    do_365_reception_probability,
+    fitted_reception_probability,
+)
 from components.surveillance.squitter_clock import SquitterClocks
 from components.surveillance.stated_errors import StatedByAircraft
 from dsa_des.time.randomness import Stream, Streams
@@ -152,8 +157,8 @@ def test_laws_of_reception():
     for law, ends in LAWS.values():
         p = law(ranges)
         assert ((p >= 0.0) & (p <= 1.0)).all() and (p[ranges > ends] == 0.0).all()
-    assert fitted(np.zeros(1))[0] == 1.0
-    near, far = do_365(np.array([5.0, 15.0]) * 1852.0)
+    assert fitted_reception_probability(np.zeros(1))[0] == 1.0
+    near, far = do_365_reception_probability(np.array([5.0, 15.0]) * 1852.0)
     # Two messages a second, of which one comes within 3 s and 7 s with 95 %.
     within = [1.0 - (1.0 - near) ** 6, 1.0 - (1.0 - far) ** 14]
     assert within == pytest.approx([0.95, 0.95])

@@ -12,7 +12,7 @@ from components.surveillance.reception import (
     BY_AIRPORT,
     FITTED_COEFFICIENTS,
     FITTED_RANGE_M,
-    fitted,
+    fitted_reception_probability,
 )
 
 DATA = Path(os.environ.get("REFERENCE_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -49,7 +49,7 @@ def test_the_law_is_the_fit_to_the_median_receiver(curves):
     powers = np.stack([fall * x**n for n in (1, 2, 3, 4)], axis=1)
     best = np.linalg.lstsq(powers, median - fall, rcond=None)[0]
     assert best == pytest.approx(FITTED_COEFFICIENTS, abs=0.005)
-    law = fitted(x * FITTED_RANGE_M, 50.0, 50.0)
+    law = fitted_reception_probability(x * FITTED_RANGE_M, 50.0, 50.0)
     apart = 100.0 * np.sqrt(((received - law) ** 2).mean(axis=1))
     near = apart < 2.5
     assert near.sum() == 18 and apart[~near].min() > 17.0 and apart.max() < 41.5
@@ -72,7 +72,7 @@ def test_the_law_follows_the_median_receiver_through_traffic(curves):
     assert best.reshape(4, 2)[:, 0] == pytest.approx(BY_AIRCRAFT, abs=1e-4)
     assert best.reshape(4, 2)[:, 1] == pytest.approx(BY_AIRPORT, abs=1e-3)
     for aircraft, together in ((20.0, 14.1), (95.0, 12.2), (200.0, 9.4)):
-        law = fitted(x * FITTED_RANGE_M, aircraft, 50.0)
+        law = fitted_reception_probability(x * FITTED_RANGE_M, aircraft, 50.0)
         apart = 100.0 * np.sqrt(((amid(aircraft, 50.0) - law) ** 2).mean(axis=1))
         assert np.sqrt((apart**2).mean()) < together
         assert np.sort(apart)[17] < 3.0

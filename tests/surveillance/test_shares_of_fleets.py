@@ -47,7 +47,7 @@ def test_each_keeps_its_equipage_by_itself():
     names = [f"a{number}" for number in range(20_000)]
     shares = EquipageShares(mode_s=0.8, mode_c=0.3, ads_b=0.5)
     kept = with_shares(names, [FULL] * len(names), shares, Stream(1, "traffic", "equipage"))
-    found = Roster.of(list(zip(names, kept, strict=True))).equipage
+    found = Roster.from_pairs(list(zip(names, kept, strict=True))).equipage
     assert len({id(one) for one in kept}) == 8
     z = NormalDist().inv_cdf(0.9995)
     for part, share in ((found.mode_s, 0.8), (found.mode_c, 0.3), (found.ads_b, 0.5)):
@@ -72,7 +72,7 @@ intruder = {{ mode_s = true, ads_b = {{}} }}"""
 
 def test_what_is_not_given_is_not_there_and_addresses_are_kept():
     some = Aircraft(mode_s=True, icao_address="4840d6")
-    found = Roster.of([("a", Aircraft()), ("b", some), ("c", FULL)]).equipage
+    found = Roster.from_pairs([("a", Aircraft()), ("b", some), ("c", FULL)]).equipage
     assert found.mode_s.tolist() == [False, True, True]
     assert found.ads_b.tolist() == [False, False, True]
     assert found.address[1] == 0x4840D6 and len(set(found.address.tolist())) == 3

@@ -6,7 +6,7 @@ from statistics import NormalDist
 import numpy as np
 from wired import chain, run
 
-from components.surveillance.reception import fitted
+from components.surveillance.reception import fitted_reception_probability
 
 #: Half widths of 99 % intervals: of one value, and of all of 25 together.
 Z, Z_OF_25 = (NormalDist().inv_cdf(1.0 - 0.005 / n) for n in (1, 25))
@@ -36,7 +36,7 @@ def test_position_messages_are_received_as_the_law_says_at_every_range():
     for target in targets:
         mine = got["target"] == target["name"]
         sent = 2.0 * duration_s
-        p = float(fitted(got["true_range_m"][mine][:1])[0])
+        p = float(fitted_reception_probability(got["true_range_m"][mine][:1])[0])
         # How many are sent varies by 0.23 of the root of them, and of each whether it comes.
         variance = sent * (p * (1.0 - p) + p * p * (0.2**2 / 12) / 0.5**2)
         assert abs(mine.sum() - sent * p) < Z_OF_25 * sqrt(variance) + 2, target

@@ -14,11 +14,11 @@ import dsa_des
 from components.flights.bounds import _place, check_above_terrain, check_on_raster
 from components.terrain.raster import ElevationRaster, mosaic, read_raster
 from components.terrain.rays import (
-    behind_terrain,
-    behind_the_limb,
     bent_elevation_rad,
     dip_rad,
     geodetic_of,
+    is_behind_limb,
+    is_behind_terrain,
     miss_bound_m,
     rays_between,
 )
@@ -77,7 +77,7 @@ def test_the_limb_of_the_ellipsoid_in_closed_form():
     nearest = np.linalg.norm(a + share * (b - a), axis=0) - 6378137.0
     clear = np.abs(nearest) > 1.0
     assert 50 < np.count_nonzero(nearest < 0) < 350
-    assert (behind_the_limb(own, other) == (nearest < 0))[clear].all()
+    assert (is_behind_limb(own, other) == (nearest < 0))[clear].all()
 
 
 @pytest.mark.parametrize(("refraction", "factor"), [("none", 1.0), ("four_thirds", 4 / 3)])
@@ -86,7 +86,7 @@ def test_the_range_to_the_horizon_is_that_of_the_textbook(refraction, factor):
     east = np.arange(50e3, 300e3, 50.0)
     own = (0 * east - 35.0, 0 * east + 10.0, 0 * east + 800.0)
     lat, lon, _ = pymap3d.enu2geodetic(east, 0 * east, 0 * east, -35.0, 10.0, 0.0)
-    hidden = behind_the_limb(own, (lat, lon, 0 * east + 400.0), refraction=refraction)
+    hidden = is_behind_limb(own, (lat, lon, 0 * east + 400.0), refraction=refraction)
     first = int(np.argmax(hidden))
     assert hidden[first:].all() and not hidden[:first].any()
     # Along the parallel the radius of curvature is the prime vertical's.
@@ -156,16 +156,16 @@ def test_rays_through_mountains_by_brute_force(refraction):
         height = height + (length**2 / (2 * R) / 4)[:, None] * shares * (1 - shares)
     ground = bilinear(raster, lat, lon)
     above = (ground - height).max(axis=1)
-    found = behind_terrain(*ends, raster, refraction=refraction)
+    found = is_behind_terrain(*ends, raster, refraction=refraction)
     assert 5 < np.count_nonzero(found) < count - 5
     # Never hidden where nothing stands in it (the brute force's comb misses crests by metres);
     # missed only by less than the bound.
     assert (above[found] > -15.0).all()
     assert (above[~found] < miss_bound_m(raster)).all()
     # The raster's zero counts, and one by one they are what they are together.
-    assert behind_terrain(*ends, raster, offset_m=2000.0).all()
+    assert is_behind_terrain(*ends, raster, offset_m=2000.0).all()
     single = [
-        behind_terrain(
+        is_behind_terrain(
             *([a[i : i + 1] for a in end] for end in ends), raster, refraction=refraction
         )
         for i in range(count)
@@ -224,8 +224,8 @@ def test_a_plain_hides_what_a_sea_of_its_height_hides(refraction):
     ends = (*own, lift - tilt), (*other, lift + tilt)
     low = rays_between(*ends, refraction).lowest_height_m()
     known = np.abs(low - 500.0) > miss_bound_m(plain) + 0.001
-    hidden = behind_terrain(*ends, plain, refraction=refraction)
-    assert (hidden == behind_the_limb(*ends, surface_m=500.0, refraction=refraction))[known].all()
+    hidden = is_behind_terrain(*ends, plain, refraction=refraction)
+    assert (hidden == is_behind_limb(*ends, surface_m=500.0, refraction=refraction))[known].all()
     assert 100 < hidden.sum() < 400
 
 

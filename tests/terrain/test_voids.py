@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from components.terrain.raster import mosaic, read_raster
-from components.terrain.voids import filled_voids
+from components.terrain.voids import fill_voids
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
@@ -52,7 +52,7 @@ def test_even_ground_is_filled_evenly(tmp_path, void):
 def test_a_node_is_the_mean_of_its_neighbours():
     heights = np.array([[1.0, 2.0, 3.0], [4.0, np.nan, 6.0], [7.0, 9.0, 9.0]] * 3)
     heights[4, 1], heights[7, 1] = 5.0, 5.0
-    filled, count = filled_voids(np.tile(heights, (1, 3)))
+    filled, count = fill_voids(np.tile(heights, (1, 3)))
     assert count == 3 and filled[1, 1] == pytest.approx((2 + 4 + 6 + 9) / 4)
 
 

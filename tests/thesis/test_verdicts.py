@@ -75,7 +75,7 @@ def test_verdict_follows_from_the_numbers_and_the_basis() -> None:
         basis = make("a test")
         assert Row("q", 9.144, "", "", "9.14", basis=basis).verdict == name
         far = Row("q", 9.146, "", "", "9.14", None, "of a test", basis)
-        assert (far.verdict, far.said) == ("differs because", "differs because of a test")
+        assert (far.verdict, far.verdict_text) == ("differs because", "differs because of a test")
         assert Row("q", 9.2, "", "", "9.14", 0.1, basis=basis).verdict == name
         assert Row("q", 9.14, "", "", basis=basis).verdict == "no value printed"
         with pytest.raises(ValueError, match="no reason why"):
@@ -88,12 +88,12 @@ def test_verdict_follows_from_the_numbers_and_the_basis() -> None:
 def test_a_row_beside_a_printed_number_takes_what_is_said_of_it_but_for_what_it_says() -> None:
     basis = configured("a test")
     number = Printed("9.14", 0.1, "of a test")
-    assert number.beside("q", 9.2, "", "", basis).verdict == "configured"
-    assert number.beside("q", 9.2, "", "", basis, tolerance=0.0).said.endswith("of a test")
-    far = number.beside("q", 9.3, "km", "So.", basis, because="of the row", again="p")
+    assert number.compare("q", 9.2, "", "", basis).verdict == "configured"
+    assert number.compare("q", 9.2, "", "", basis, tolerance=0.0).verdict_text.endswith("of a test")
+    far = number.compare("q", 9.3, "km", "So.", basis, because="of the row", again="p")
     assert far == Row("q", 9.3, "km", "So.", "9.14", 0.1, "of the row", basis, again="p")
-    assert Printed("9.14").beside("q", 9.144, "", "", basis).near
-    assert not Printed("9.14").beside("q", 9.146, "", "", basis).near
+    assert Printed("9.14").compare("q", 9.144, "", "", basis).is_near
+    assert not Printed("9.14").compare("q", 9.146, "", "", basis).is_near
 
 
 def test_only_a_prediction_counts_and_only_once() -> None:

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 
-from components.estimation.covariance_intersection import intersected, inverse
+from components.estimation.covariance_intersection import intersect_covariances, inverse
 from components.estimation.frame import frame_change
 from components.estimation.motion import ConstantVelocity
 from components.track_fusion.local_tracks import LocalTracks
@@ -33,7 +33,7 @@ def test_the_weight_is_that_of_a_numerical_minimum(rule):
     apart = np.random.default_rng(3).normal(size=(6, 12))
     information = inverse(second)
     pull = np.einsum("ijn,jn->in", information, apart)
-    shift, spread, weight = intersected(first, information, pull, rule)
+    shift, spread, weight = intersect_covariances(first, information, pull, rule)
     inside = 0
     for k in range(12):
         p, q = first[..., k], second[..., k]
@@ -60,7 +60,7 @@ def test_one_case_to_40_digits():
         ratio = [mpmath.mpf(a) / mpmath.mpf(b) for a, b in zip(np.diag(first), np.diag(second),
                                                                strict=True)]  # fmt: skip
         wanted = mpmath.findroot(lambda w: sum((1 - r) / (w + (1 - w) * r) for r in ratio), 0.5)
-    _, spread, weight = intersected(
+    _, spread, weight = intersect_covariances(
         first[..., None], inverse(second[..., None]), np.zeros((6, 1)), "determinant"
     )
     assert weight[0] == pytest.approx(float(wanted), rel=1e-14)
@@ -72,7 +72,7 @@ def test_one_case_to_40_digits():
 
 def test_independent_estimates_add_their_information():
     first, second = covariances(5, 3), covariances(6, 3)
-    _, spread, _ = intersected(first, inverse(second), np.zeros((6, 3)), "independent")
+    _, spread, _ = intersect_covariances(first, inverse(second), np.zeros((6, 3)), "independent")
     for k in range(3):
         wanted = np.linalg.inv(np.linalg.inv(first[..., k]) + np.linalg.inv(second[..., k]))
         np.testing.assert_allclose(spread[..., k], wanted, rtol=1e-7, atol=1e-9)
@@ -138,7 +138,7 @@ def test_a_direction_leaves_beyond_three_times_its_own_gate():
 
 def test_a_pair_s_distance_is_its_own_whoever_stands_beside_it():
     random = np.random.default_rng(2)
-    some = LocalTracks.joined([
+    some = LocalTracks.concatenate([
         tracks_of(
             state=random.normal(0.0, 500.0, (6, 3)), ranged=random.random(3) < 0.5,
             azimuth_rad=random.uniform(-3.0, 3.0, 3), elevation_rad=random.uniform(-1.4, 1.4, 3),

@@ -16,7 +16,11 @@ from components.messages.detections import (
     SensorOffer,
     promises_of_looks,
 )
-from components.surveillance.reception import certain, do_365, time_to_receive_s
+from components.surveillance.reception import (
+    certain,
+    do_365_reception_probability,
+    time_to_receive_s,
+)
 from components.tracking.promises import Promises
 from components.tracking.rules import LastingErrors
 from components.tracking.scans import Scans
@@ -186,7 +190,9 @@ def test_a_given_time_is_that_time():
 
 def test_messages_promise_what_they_do():
     """95 % within 3 s and 7 s is what DO-365 says, and what its law is made of."""
-    near, far = time_to_receive_s(do_365(np.array([9.0, 11.0]) * NAUTICAL_MILE_M))
+    near, far = time_to_receive_s(
+        do_365_reception_probability(np.array([9.0, 11.0]) * NAUTICAL_MILE_M)
+    )
     assert (near, far) == pytest.approx((3.0 + 0.2, 7.0 + 0.2))
     assert time_to_receive_s(certain(np.zeros(1))) == pytest.approx([0.7])
     assert time_to_receive_s(np.zeros(1)) == [60.0]
@@ -227,7 +233,7 @@ def test_velocities_of_looks_are_turned_into_the_axes_of_their_frames():
     measured = np.arange(21.0).reshape(7, 3)
     measured[:, 1] = np.nan
     looks = _Looks(measured, np.array([0, 1, 3]), np.vstack([place, np.zeros((3, 2))]))
-    turned = Scans.in_frame(looks, origin).measured
+    turned = Scans.rotate_to_frame(looks, origin).measured
     assert turned is not measured and np.array_equal(turned[:4], measured[:4], equal_nan=True)
     for entry, look in ((0, 0), (2, 1)):
         ecef = pymap3d.enu2uvw(*measured[[5, 4], entry], -measured[6, entry], *place[:2, look])
@@ -235,7 +241,7 @@ def test_velocities_of_looks_are_turned_into_the_axes_of_their_frames():
         assert turned[4:, entry] == pytest.approx([north, east, -up], abs=1e-6)
     assert np.isnan(turned[4:, 1]).all()
     silent = replace(looks, measured=np.full((7, 3), np.nan))
-    assert Scans.in_frame(silent, origin) is silent
+    assert Scans.rotate_to_frame(silent, origin) is silent
 
 
 @dataclass(frozen=True)

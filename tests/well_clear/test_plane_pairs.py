@@ -66,7 +66,7 @@ def test_what_is_sure_is_what_the_flights_do(far_m: float, up_m: float) -> None:
     pairs = PairsInPlane(paths)
     found = ~np.isnan(first_losses_s([relative(paths, k) for k in range(80)], *SIZES_M))
     for k, limits in enumerate(SIZES_M):
-        surely, unsure = pairs.inside(*limits)
+        surely, unsure = pairs.classify_inside(*limits)
         assert not (surely & unsure).any()
         assert surely[~unsure].tolist() == found[~unsure, k].tolist()
         assert 3 < surely.sum() < 77 and unsure.sum() < 45
@@ -77,7 +77,7 @@ def test_distances_hold_to_what_the_margin_allows_for() -> None:
     paths = turning_pairs(np.random.default_rng(3), 20, 4.2e4, 19e3)
     at_m = np.array([PairsInPlane(paths)._level_m[:, k] for k in range(20)])
     for k in range(20):
-        true_m = relative(paths, k).at(paths.time_s).horizontal_m
+        true_m = relative(paths, k).separation_at(paths.time_s).horizontal_m
         assert (np.abs(at_m[k] - true_m) <= 1e-4 * true_m + 0.7).all()
 
 
@@ -87,10 +87,10 @@ def test_what_the_plane_cannot_tell_is_left_to_the_flights() -> None:
         shift = np.array(change)[:, np.newaxis, np.newaxis]
         surely, unsure = PairsInPlane(
             PairPaths(near.time_s, near.own_m + shift, near.other_m + shift)
-        ).inside(*SIZES_M[0])
+        ).classify_inside(*SIZES_M[0])
         assert unsure.all() and not surely.any()
     one = PairPaths(near.time_s[:1], near.own_m[:, :1], near.other_m[:, :1])
-    assert PairsInPlane(one).inside(*SIZES_M[0])[1].all()
+    assert PairsInPlane(one).classify_inside(*SIZES_M[0])[1].all()
 
 
 def straight(*pairs: tuple[tuple[float, ...], tuple[float, ...]]) -> PairPaths:
@@ -168,7 +168,9 @@ def test_pairs_are_inside_where_closely_spaced_places_on_their_ways_are() -> Non
     apart[2, :, :60] = apart[2, :1, :60]  # level
     apart[:, :, 60:80] = apart[:, :1, 60:80]  # at rest
     own = np.zeros_like(apart)
-    surely, unsure = PairsInPlane(PairPaths(np.array([0.0, 4.0, 9.0]), own, apart)).inside(*limits)
+    surely, unsure = PairsInPlane(PairPaths(np.array([0.0, 4.0, 9.0]), own, apart)).classify_inside(
+        *limits
+    )
     share = np.linspace(0.0, 1.0, 1501)[:, None]
     inside = np.zeros(count, dtype=bool)
     for k in (0, 1):
@@ -192,5 +194,5 @@ def test_what_is_as_near_a_limit_as_the_plane_errs_is_unsure(
     place = np.array([0.6 * level_m, 0.8 * level_m, up_m])
     apart = np.repeat(place, 2).reshape(3, 2, 1)
     pairs = PairsInPlane(PairPaths(np.array([0.0, 1.0]), np.zeros_like(apart), apart))
-    said = dict(zip(("surely", "unsure"), pairs.inside(500.0, 100.0), strict=True))
+    said = dict(zip(("surely", "unsure"), pairs.classify_inside(500.0, 100.0), strict=True))
     assert {name for name, is_so in said.items() if is_so[0]} == ({found} if found else set())

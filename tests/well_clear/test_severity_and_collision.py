@@ -7,7 +7,7 @@ import pytest
 from components.well_clear.severity import (
     altimeter_scales,
     collision_probability,
-    difference_beyond,
+    laplace_difference_exceedance,
     loss_severity,
     miss_distance_m,
 )
@@ -78,7 +78,7 @@ def test_the_tail_of_the_difference_is_the_integral(height, scales):
 
     kinks = sorted({-mpmath.inf, mpmath.mpf(0), mpmath.mpf(height), mpmath.inf})
     wanted = mpmath.quad(beyond, kinks)
-    assert difference_beyond(height, *scales) == pytest.approx(float(wanted), rel=1e-10)
+    assert laplace_difference_exceedance(height, *scales) == pytest.approx(float(wanted), rel=1e-10)
 
 
 def test_a_collision_needs_a_small_miss_distance():

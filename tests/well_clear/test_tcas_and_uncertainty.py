@@ -8,7 +8,7 @@ from components.arguments.units import FOOT_M
 from components.well_clear.detection import (
     Bounds,
     detection_span,
-    some_bounds,
+    select_bounds,
     uncertain_violation_span,
 )
 from components.well_clear.tcas import (
@@ -157,9 +157,9 @@ def test_how_far_spans_reach_is_that_of_the_worst_within_the_bounds():
     np.testing.assert_allclose(plain, violation_span(volume, tuple(states), begin_s, end_s))
     with pytest.raises(ValueError, match="advisories of TCAS II need the ownship's altitude"):
         detection_span(TcasAdvisory(True), tuple(states), None, None, 0.0, 60.0)
-    part = some_bounds(Bounds(*bounds), [0, 4])
+    part = select_bounds(Bounds(*bounds), [0, 4])
     assert [value.tolist() for value in part] == [[100, 0], [20, 0], [10, 0], [1, 0]]
-    assert some_bounds(None, [0, 4]) is None
+    assert select_bounds(None, [0, 4]) is None
 
 
 def test_no_state_within_the_bounds_violates_outside_the_span():

@@ -11,7 +11,7 @@ from components.well_clear.volume import (
     TIME_VARIABLES,
     Volume,
     cylinder_span,
-    inside_cylinder,
+    is_inside_cylinder,
     violates,
     violation_span,
 )
@@ -209,8 +209,10 @@ def test_the_boundary_of_a_cylinder_is_outside():
     ]
     touching = cylinder_span(700.0, 90.0, tuple(np.array(on_it).T), 0.0, END_S)
     assert (touching.begin_s == np.inf).all()
-    assert not inside_cylinder(np.array([700.0, 10.0]), np.array([0.0, -90.0]), 700.0, 90.0).any()
-    assert inside_cylinder(np.array([699.0]), np.array([-89.0]), 700.0, 90.0).all()
+    assert not is_inside_cylinder(
+        np.array([700.0, 10.0]), np.array([0.0, -90.0]), 700.0, 90.0
+    ).any()
+    assert is_inside_cylinder(np.array([699.0]), np.array([-89.0]), 700.0, 90.0).all()
 
 
 @pytest.mark.parametrize(

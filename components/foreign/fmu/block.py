@@ -9,7 +9,7 @@ import numpy as np
 
 from components.aircraft.known_targets import known_targets
 from components.foreign.fmu.message_columns import message_column
-from components.foreign.fmu.own_pose import own_columns, true_lines
+from components.foreign.fmu.own_pose import ownship_columns, true_lines
 from components.foreign.fmu.parameters import FmuParameters
 from components.foreign.fmu.units import unit_of_column
 from components.foreign.signals import Signals
@@ -157,7 +157,7 @@ class ForeignFmu(Component):
                     raise ValueError(
                         f"{key}: {block!r} gives no {column!r}{did_you_mean(column, offer)}"
                     )
-                self.p.model.converted(offer[column], variable)
+                self.p.model.unit_conversion(offer[column], variable)
 
     def warnings(self) -> list[str]:
         """Say that its communication points are not where its solver's steps are."""
@@ -193,7 +193,7 @@ class ForeignFmu(Component):
         seen_from = truth = None
         if self.p.detections and self._sees_own:
             moves = wiring.detections.asks_for_velocity()
-            seen_from, self._own = own_columns(wake, "messages", self._own, moves=moves)
+            seen_from, self._own = ownship_columns(wake, "messages", self._own, moves=moves)
             truth = true_lines(wake, "messages", len(self._roster))
         if len(own) == 0:
             return None
@@ -273,7 +273,7 @@ class ForeignFmu(Component):
                     unit = unit_of_column(column)
                     if isinstance(message, Signals) and column in message.names:
                         unit = message.units[message.names.index(column)]
-                    self._scales[at] = self.p.model.converted(unit, variable)
+                    self._scales[at] = self.p.model.unit_conversion(unit, variable)
                 a, b = self._scales[at]
                 came = a * message_column(message, column, which, key) + b
                 known = np.isfinite(came)

@@ -188,7 +188,7 @@ class DetectionOutputs:
             If one that is named is not in the scene.
         """
         if not known:
-            return Roster.of([(name, Aircraft()) for name in self.targets])
+            return Roster.from_pairs([(name, Aircraft()) for name in self.targets])
         for name in self.targets:
             if name not in known[0].names:
                 raise ValueError(

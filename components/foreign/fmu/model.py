@@ -119,7 +119,7 @@ class FmuModel:
             raise ValueError(f"{self.path.name} has no {what} {name!r}{did_you_mean(name, names)}")
         return self.variables[name]
 
-    def converted(self, unit: str, variable: Variable) -> tuple[float, float]:
+    def unit_conversion(self, unit: str, variable: Variable) -> tuple[float, float]:
         """Return (a, b): a value x of `unit` is a x + b in the variable's own unit.
 
         Raises

@@ -13,7 +13,7 @@ from dsa_des.block.wake import Wake
 _LEVEL_OF_TRUST = (TrafficStates, RelativeTargets)
 
 
-def own_columns(
+def ownship_columns(
     wake: Wake, port: str, held: dict[tuple[int, str], FloatArray], *, moves: bool
 ) -> tuple[FloatArray, dict[tuple[int, str], FloatArray]]:
     """Return the ownship at each row of a wake, and what is held of each source from now on.
@@ -48,14 +48,14 @@ def own_columns(
         mine = np.repeat(held.get(key, np.full(len(found), np.nan))[:, np.newaxis], len(wake), 1)
         if key in came:
             place = np.searchsorted(came[key].tick, wake.ticks, side="right") - 1
-            said = _said(came[key].message, wake, moves)
+            said = _pose_rows(came[key].message, wake, moves)
             mine[:, place >= 0] = said[:, place[place >= 0]]
         after[key] = mine[:, -1].copy()
         found = np.where(np.isnan(mine), found, mine)
     return found, after
 
 
-def _said(message: Any, wake: Wake, moves: bool) -> FloatArray:
+def _pose_rows(message: Any, wake: Wake, moves: bool) -> FloatArray:
     """Return what each row of a message says, (9, rows)."""
     rows = len(message)
     found = np.full((len(POSE) + len(OWN_VELOCITY), rows), np.nan)

@@ -16,8 +16,8 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from components.foreign.child_process import ChildProcess, how_it_ended
-from dsa_des.text.safe_text import printable, shortened
+from components.foreign.child_process import ChildProcess, describe_exit
+from dsa_des.text.safe_text import printable, shorten
 
 _ROOT = Path(__file__).parents[3]
 # Ours is looked for last: what runs the FMU finds it where it is not installed, too.
@@ -98,7 +98,7 @@ class FmuProcess:
         finally:
             watch.stop()
         if len(head) < 8 or len(content) < size:
-            raise self._gone(watch, deadline_s)
+            raise self._ended_error(watch, deadline_s)
         answer: dict[str, Any] = pickle.loads(content)
         if "failed" in answer:
             words = self._last_words()
@@ -110,7 +110,7 @@ class FmuProcess:
             raise error
         return answer
 
-    def _gone(self, watch: "_Watch", deadline_s: float) -> FmuError:
+    def _ended_error(self, watch: "_Watch", deadline_s: float) -> FmuError:
         self._process.kill()
         code = self._process.wait()
         words = self._last_words()
@@ -118,7 +118,7 @@ class FmuProcess:
         if watch.late:
             why = f"did not answer within {deadline_s:g} s (deadline_s)"
         else:
-            why = f"its process {how_it_ended(code)}"
+            why = f"its process {describe_exit(code)}"
         return FmuError(f"{self.path.name}: {why}{words}")
 
     def _last_words(self) -> str:
@@ -127,7 +127,7 @@ class FmuProcess:
         except OSError:
             return ""
         lines = [printable(line) for line in text.splitlines() if line.strip()]
-        return f"; it printed: {shortened(' | '.join(lines[-3:]), 300)}" if lines else ""
+        return f"; it printed: {shorten(' | '.join(lines[-3:]), 300)}" if lines else ""
 
 
 class _Watch:

@@ -94,7 +94,7 @@ class Wiring:
                 continue
             groups.setdefault(variable.kind, []).append(variable)
         ordered = sorted(groups, key=lambda kind: kind in TEXT_KINDS)
-        self.outputs = [(kind, self._sized(groups[kind])) for kind in ordered]
+        self.outputs = [(kind, self._value_ranges(groups[kind])) for kind in ordered]
         variables = [variable for kind in ordered for variable in groups[kind]]
         self.names = tuple([v.name for v in variables] + raised)
         self.units = tuple([v.unit for v in variables] + [""] * len(raised))
@@ -109,7 +109,7 @@ class Wiring:
             self.number_count += size if variable.kind not in TEXT_KINDS else 0
         self.layout += [(len(variables) + i, 0) for i in range(len(raised))]
 
-    def _sized(self, variables: Sequence[Variable]) -> list[tuple[int, int]]:
+    def _value_ranges(self, variables: Sequence[Variable]) -> list[tuple[int, int]]:
         return [(variable.reference, self.size(variable)) for variable in variables]
 
     def _read_fields(self, key: str, given: Mapping[str, str], known: Sequence[str]) -> None:
@@ -119,7 +119,7 @@ class Wiring:
             elif output in self.model.variables:
                 variable = self.model.variables[output]
                 try:
-                    self.model.converted(unit_of_column(name), variable)
+                    self.model.unit_conversion(unit_of_column(name), variable)
                     if self.size(variable) != 1 or variable.kind in TEXT_KINDS:
                         raise ValueError(f"{output!r} is no single number")
                 except ValueError as error:
@@ -129,7 +129,7 @@ class Wiring:
         """Return where the numbers hold an output, and how it becomes a column: (place, a, b)."""
         code = self.names.index(output)
         place = next(i for i, (signal, _) in enumerate(self.layout) if signal == code)
-        a, b = self.model.converted(unit_of_column(name), self.model.variables[output])
+        a, b = self.model.unit_conversion(unit_of_column(name), self.model.variables[output])
         return place, 1.0 / a, -b / a
 
     # -- inputs --------------------------------------------------------------------------------
@@ -155,7 +155,7 @@ class Wiring:
             if variable not in group:
                 group.append(variable)
             parsed.append((variable, place, source))
-        self.inputs = [(kind, self._sized(groups[kind])) for kind in groups]
+        self.inputs = [(kind, self._value_ranges(groups[kind])) for kind in groups]
         first, self.defaults = dict[str, int](), list[float]()
         for kind in groups:
             for variable in groups[kind]:
@@ -271,7 +271,7 @@ class Wiring:
         }  # fmt: skip
 
     def _clock(self, clock: PartitionClock, ticks_per_s: int) -> dict[str, Any]:
-        """Return when a clock ticks; those of scheduled FMUs are told at every wake."""
+        """Return when a clock ticks; clocks of scheduled FMUs get their ticks at every wake."""
         interval, shift = Fraction(0), Fraction(0)
         given = self.p.clocks.get(clock.name)
         times: list[Fraction] = []

@@ -40,7 +40,7 @@ def ulog_log(problems: Problems, data: bytes, stem: str) -> Log:
     callsigns: dict[str, str] = {}
 
     def each() -> Iterator[tuple[int, PositionReport]]:
-        own, heard = _own_of_ulog(problems, topics, stem), _heard_by_px4(topics, callsigns)
+        own, heard = _own_of_ulog(problems, topics, stem), _reports_heard_by_px4(topics, callsigns)
         try:
             yield from enumerate(chain(own, heard), start=1)
         except (KeyError, IndexError, TypeError) as error:
@@ -92,7 +92,7 @@ def _own_samples(topics: Mapping[str, Topic], name: str, stem: str) -> Iterator[
         )
 
 
-def _at(times_s: FloatArray, values: AnyArray, wanted_s: FloatArray) -> FloatArray:
+def _latest_values(times_s: FloatArray, values: AnyArray, wanted_s: FloatArray) -> FloatArray:
     return np.interp(wanted_s, times_s, np.asarray(values, float))
 
 
@@ -107,7 +107,9 @@ def _velocity(
         north, east, down = (own[f"vel_{axis}"] for axis in "ned")
     elif len(local.get("timestamp", ())) and "vx" in local:
         known_s = np.asarray(local["timestamp"], float) / 1e6
-        north, east, down = (_at(known_s, local[key], boot_s) for key in ("vx", "vy", "vz"))
+        north, east, down = (
+            _latest_values(known_s, local[key], boot_s) for key in ("vx", "vy", "vz")
+        )
     else:
         return [np.full(len(boot_s), np.nan)] * 3
     return [np.degrees(np.arctan2(east, north)) % 360.0, np.hypot(north, east), -down]
@@ -127,7 +129,7 @@ def _attitude(topics: Mapping[str, Topic], boot_s: FloatArray) -> list[FloatArra
     return [np.degrees(angle) for angle in (yaw, pitch, roll)]
 
 
-def _heard_by_px4(
+def _reports_heard_by_px4(
     topics: Mapping[str, Topic], callsigns: dict[str, str]
 ) -> Iterator[PositionReport]:
     heard = topics.get("transponder_report", {})
@@ -216,7 +218,7 @@ def _end_of_frame(data: bytes, at: int) -> int | None:
 
 
 def tlog_log(problems: Problems, data: bytes, stem: str) -> Log:
-    """Return the flights of the vehicles in a tlog, and the aircraft that they heard.
+    """Return the flights of the vehicles in a tlog, and of the aircraft they received.
 
     Times are those of the ground station. Heights of vehicles are above mean sea level.
     """

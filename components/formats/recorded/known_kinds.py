@@ -78,7 +78,7 @@ def record(
         It is ASTERIX, and the extra ``asterix`` is not installed.
     """
     problems = Problems(str(path))
-    data = _unzipped(problems, read_content(path, problems))
+    data = _unzip(problems, read_content(path, problems))
     stem = re.sub(r"(\.\w{1,7}){1,2}$", "", path.name) or path.name
     if data.startswith(_PARQUET):
         return _of_parquet(problems, data, altitude, stem)
@@ -126,7 +126,7 @@ def _log_of(problems: Problems, data: bytes, stem: str) -> Log | None:
     return log_of(problems, data)
 
 
-def _unzipped(problems: Problems, data: bytes) -> bytes:
+def _unzip(problems: Problems, data: bytes) -> bytes:
     """Return the one file of an archive (``.kmz``, ``.csv.zip``), or the content as it is."""
     if not data.startswith(_ZIP):
         return data
@@ -182,14 +182,14 @@ def _blocks_of(problems: Problems, data: bytes) -> tuple[float, bytes, int]:
     sent = udp_payloads(problems, data)
     blocks = [(time_s, payload) for time_s, payload in sent if _is_asterix(payload)]
     path = Path(problems.path)
-    if blocks and not _can_be_read(path, b"".join(payload for _, payload in blocks)):
-        blocks = [one for one in blocks if _can_be_read(path, one[1])]
+    if blocks and not _is_readable(path, b"".join(payload for _, payload in blocks)):
+        blocks = [one for one in blocks if _is_readable(path, one[1])]
     if not blocks:
         problems.fail(f"none of {len(sent)} datagrams of the capture is ASTERIX that can be read")
     return blocks[0][0], b"".join(payload for _, payload in blocks), len(sent) - len(blocks)
 
 
-def _can_be_read(path: Path, data: bytes) -> bool:
+def _is_readable(path: Path, data: bytes) -> bool:
     try:
         read_records(path, data)
     except TrafficFileError:

@@ -47,7 +47,7 @@ class TrackWindows:
         #: How many flights have a window.
         self.flights = len({piece.flight for piece in self._pieces})
 
-    def drawn(self, share: float) -> tuple[int, FloatArray]:
+    def draw_window(self, share: float) -> tuple[int, FloatArray]:
         """Return the flight of the window at a share [0, 1) of all, and its path.
 
         It is north, east and altitude (3, seconds + 1) in m, north and east from where it is at the
@@ -78,7 +78,7 @@ def is_flying(velocity: FloatArray) -> bool:
     return bool(np.hypot(velocity[0], velocity[1]) >= _SLOWEST_MPS)
 
 
-def turned(path: FloatArray, velocity: FloatArray, course_rad: float) -> FloatArray:
+def turn_path(path: FloatArray, velocity: FloatArray, course_rad: float) -> FloatArray:
     """Return a path turned about the place of its closest approach, so that its course there is."""
     angle = course_rad - np.arctan2(velocity[1], velocity[0])
     cos, sin = np.cos(angle), np.sin(angle)
@@ -86,7 +86,7 @@ def turned(path: FloatArray, velocity: FloatArray, course_rad: float) -> FloatAr
     return np.array([north * cos - east * sin, north * sin + east * cos, up])
 
 
-def apart(
+def place_other_path(
     own: FloatArray, other: FloatArray, at: int, place_m: tuple[float, float], up_m: float
 ) -> FloatArray:
     """Return the other path moved so that it is at a place and so far above the own one then."""

@@ -10,7 +10,7 @@ from components.formats.recording import Recording, Samples
 from components.formats.text_rows import MOST_PROBLEMS, Problems
 from components.geometry import enu_to_geodetic, line_of_sight_ned
 from dsa_des.arrays.types import BoolArray
-from dsa_des.text.safe_text import shortened
+from dsa_des.text.safe_text import shorten
 
 #: Reports of one aircraft from another receiver within this time say nothing new, s.
 _SAME_S = 1.0
@@ -19,7 +19,7 @@ _ADDRESS = re.compile(r"~?[0-9a-fA-F]{6}")
 AWAY = "away"
 
 
-def together(recordings: Iterable[tuple[str, Recording]]) -> Recording:
+def join_recordings(recordings: Iterable[tuple[str, Recording]]) -> Recording:
     """Return one recording of several files, by their names; the first aircraft stays the first.
 
     An aircraft that several receivers heard is one by its address: later files fill in where those
@@ -38,7 +38,7 @@ def together(recordings: Iterable[tuple[str, Recording]]) -> Recording:
         for name, columns in one.samples.items():
             known = by_address.get(name.lower()) if _ADDRESS.fullmatch(name) else None
             if known is not None:
-                samples[known], both = _joined(samples[known], columns), both + 1
+                samples[known], both = _join_samples(samples[known], columns), both + 1
                 continue
             called = name if name not in samples else f"{name} ({file})"
             while called in samples:
@@ -56,7 +56,7 @@ def together(recordings: Iterable[tuple[str, Recording]]) -> Recording:
     return replace(whole, samples=samples, callsigns=callsigns, height=", ".join(sorted(heights)))
 
 
-def _joined(first: Samples, other: Samples) -> Samples:
+def _join_samples(first: Samples, other: Samples) -> Samples:
     """Return the samples of an aircraft, and those of another file where there are none near."""
     times = first["time"]
     after = np.searchsorted(times, other["time"])
@@ -72,7 +72,7 @@ def _joined(first: Samples, other: Samples) -> Samples:
     return {key: values[order] for key, values in merged.items()}
 
 
-def named(problems: Problems, recording: Recording, name: str) -> str:
+def find_aircraft(problems: Problems, recording: Recording, name: str) -> str:
     """Return the name of the aircraft that is called so, by its name or by its callsign alone."""
     if name in recording.samples:
         return name
@@ -85,25 +85,27 @@ def named(problems: Problems, recording: Recording, name: str) -> str:
     ]
     if len(found) == 1:
         return found[0]
-    known = [shortened(one) for one in recording.samples]
+    known = [shorten(one) for one in recording.samples]
     more = ", …" if len(known) > MOST_PROBLEMS else ""
     what = f"several are called {name!r}" if found else f"there is no aircraft {name!r}"
     problems.fail(f"{what}: it must be one of {', '.join(known[:MOST_PROBLEMS])}{more}")
 
 
-def without(recording: Recording, names: Collection[str]) -> Recording:
+def drop_aircraft(recording: Recording, names: Collection[str]) -> Recording:
     """Return a recording without some aircraft."""
-    gone = {named(recording.problems, recording, name) for name in names}
+    gone = {find_aircraft(recording.problems, recording, name) for name in names}
     return replace(recording, samples={n: c for n, c in recording.samples.items() if n not in gone})
 
 
-def led_by(recording: Recording, own: str) -> Recording:
+def with_ownship(recording: Recording, own: str) -> Recording:
     """Return a recording whose ownship is another aircraft of it."""
     first = {own: recording.samples[own]}
     return replace(recording, samples=first | recording.samples)
 
 
-def moved(columns: Samples, later_s: float, north_m: float, east_m: float, up_m: float) -> Samples:
+def move_flight(
+    columns: Samples, later_s: float, north_m: float, east_m: float, up_m: float
+) -> Samples:
     """Return a flight at another time, and as it is at another place."""
     lat, lon, alt = (columns[key] for key in ("lat", "lon", "alt"))
     if north_m or east_m or up_m:
@@ -121,7 +123,7 @@ def moved(columns: Samples, later_s: float, north_m: float, east_m: float, up_m:
     return {**columns, "time": columns["time"] + later_s, "lat": lat, "lon": lon, "alt": alt}
 
 
-def within_time(columns: Samples, from_s: float, to_s: float) -> Samples | None:
+def cut_to_time(columns: Samples, from_s: float, to_s: float) -> Samples | None:
     """Return the samples of a window of time and the one on either side; None where it is away."""
     times = columns["time"]
     if times[-1] < from_s or times[0] > to_s:
@@ -131,7 +133,7 @@ def within_time(columns: Samples, from_s: float, to_s: float) -> Samples | None:
     return {key: values[first:end] for key, values in columns.items()}
 
 
-def within_space(
+def cut_to_space(
     columns: Samples, box: tuple[float, float, float, float], heights: tuple[float, float]
 ) -> Samples | None:
     """Return the samples inside a box (south, north, west, east) and between heights.

@@ -10,13 +10,13 @@ import numpy as np
 
 from components.formats.recorded.known_kinds import record
 from components.formats.recorded.selection import (
-    led_by,
-    moved,
-    named,
-    together,
-    within_space,
-    within_time,
-    without,
+    cut_to_space,
+    cut_to_time,
+    drop_aircraft,
+    find_aircraft,
+    join_recordings,
+    move_flight,
+    with_ownship,
 )
 from components.formats.recording import Recording, Samples
 from components.formats.sample_columns import Altitude
@@ -78,26 +78,26 @@ def read_traffic(paths: Sequence[Path], choice: TrafficChoice) -> TrafficFile:
     """
     names = [path.stem for path in paths]
     each = (record(path, choice.altitude, choice.place) for path in paths)
-    whole = without(together(zip(names, each, strict=True)), choice.without)
+    whole = drop_aircraft(join_recordings(zip(names, each, strict=True)), choice.without)
     start_s = _earliest(whole)
-    own = {} if choice.scripted else _own(whole, choice, start_s)
+    own = {} if choice.scripted else _ownship_samples(whole, choice, start_s)
     others = {name: columns for name, columns in whole.samples.items() if name not in own}
     begin_s, end_s = _window(choice, start_s, own)
     kept = {}
     for name, columns in others.items():
-        inside: Samples | None = within_time(columns, begin_s, end_s)
+        inside: Samples | None = cut_to_time(columns, begin_s, end_s)
         if inside is not None and (choice.box or choice.heights != TrafficChoice.heights):
-            inside = within_space(inside, choice.box or _EVERYWHERE, choice.heights)
+            inside = cut_to_space(inside, choice.box or _EVERYWHERE, choice.heights)
         if inside is not None:
             kept[name] = inside
     if others and not kept:
-        _none_is_there(whole, others, begin_s, end_s)
+        _refuse_absent(whole, others, begin_s, end_s)
     if len(kept) < len(others):
         gone = len(others) - len(kept)
         said = f"{gone} of {len(others)} aircraft are not there in the time and place chosen"
         whole.notes.harmless.append(said)
     for name, columns in own.items():
-        own[name] = within_time(columns, begin_s, end_s) or columns
+        own[name] = cut_to_time(columns, begin_s, end_s) or columns
     file = replace(whole, samples=own | kept).flights(choice.longest_gap_s, begin_s)
     if own:
         _note_itself(file)
@@ -108,17 +108,17 @@ def _earliest(recording: Recording) -> float:
     return min((float(c["time"][0]) for c in recording.samples.values()), default=0.0)
 
 
-def _own(whole: Recording, choice: TrafficChoice, start_s: float) -> dict[str, Samples]:
+def _ownship_samples(whole: Recording, choice: TrafficChoice, start_s: float) -> dict[str, Samples]:
     """Return the ownship's samples by its name, which no other aircraft has."""
     if choice.own_file is None:
-        own = next(iter(whole.samples)) if choice.ownship is None else named(
+        own = next(iter(whole.samples)) if choice.ownship is None else find_aircraft(
             whole.problems, whole, choice.ownship
         )  # fmt: skip
-        whole.samples = led_by(whole, own).samples
+        whole.samples = with_ownship(whole, own).samples
         called, columns = own, whole.samples[own]
     else:
         flight = record(choice.own_file, choice.altitude, choice.place)
-        own = next(iter(flight.samples)) if choice.ownship is None else named(
+        own = next(iter(flight.samples)) if choice.ownship is None else find_aircraft(
             flight.problems, flight, choice.ownship
         )  # fmt: skip
         columns, called = flight.samples[own], own
@@ -133,7 +133,7 @@ def _own(whole: Recording, choice: TrafficChoice, start_s: float) -> dict[str, S
         others = replace(whole, samples={n: c for n, c in whole.samples.items() if n != called})
         first_s = _earliest(others) if others.samples else start_s
         later_s = first_s + choice.own_starts_s - float(columns["time"][0])
-    return {called: moved(columns, later_s, *choice.own_moved)}
+    return {called: move_flight(columns, later_s, *choice.own_moved)}
 
 
 def _window(choice: TrafficChoice, start_s: float, own: dict[str, Samples]) -> tuple[float, float]:
@@ -151,7 +151,7 @@ def _window(choice: TrafficChoice, start_s: float, own: dict[str, Samples]) -> t
     return begin_s, end_s
 
 
-def _none_is_there(
+def _refuse_absent(
     whole: Recording, others: dict[str, Samples], begin_s: float, end_s: float
 ) -> None:
     first_s = min(float(c["time"][0]) for c in others.values())
@@ -194,7 +194,7 @@ _EPOCH_S = 1e8
 
 
 def clock(time_s: float) -> str:
-    """Return an instant as it is said to people: in UTC where the clock counts from 1970."""
+    """Return an instant as text for people: in UTC where the clock counts from 1970."""
     if not _EPOCH_S < time_s < 4e9:
         return f"{time_s:.1f} s"
     return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d %H:%M:%S} UTC"

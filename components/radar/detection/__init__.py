@@ -3,7 +3,7 @@
 from components.radar.detection.probability import (
     METHODS,
     detection_probability,
-    first_declared,
+    first_declaration_probability,
     miss_probability,
     required_snr,
 )
@@ -13,7 +13,7 @@ __all__ = [
     "METHODS",
     "detection_probability",
     "detection_threshold",
-    "first_declared",
+    "first_declaration_probability",
     "miss_probability",
     "required_snr",
 ]

@@ -26,10 +26,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
-    checked_model,
-    checked_probability,
-    checked_pulses,
-    checked_snr,
+    check_model,
+    check_probability,
+    check_pulses,
+    check_snr,
     unflatten,
 )
 from components.radar.detection.probability import required_snr
@@ -59,9 +59,9 @@ def cfar_detection_probability(
     sum of as many pulses as the cell under test. For Swerling I and one pulse it is ``(1 + a / (1 +
     snr))**-N`` with ``a = Pfa**(-1 / N) - 1``.
     """
-    ratio = checked_snr(snr)
-    name = checked_model(model)
-    terms = _terms(*_checked(reference_cells, false_alarm_probability, pulses))
+    ratio = check_snr(snr)
+    name = check_model(model)
+    terms = _terms(*_check_arguments(reference_cells, false_alarm_probability, pulses))
     flat = np.ascontiguousarray(ratio).reshape(-1)
     with np.errstate(under="ignore"):  # far from the threshold a probability is 0
         probability = _probability(flat, terms, name)
@@ -83,7 +83,7 @@ def cfar_multiplier(
     float
         a of Pr(cell > a · sum of reference cells) = Pfa; Pfa^(-1/N) - 1 for one pulse.
     """
-    return _multiplier(*_checked(reference_cells, false_alarm_probability, pulses))
+    return _multiplier(*_check_arguments(reference_cells, false_alarm_probability, pulses))
 
 
 def cfar_required_snr(
@@ -95,14 +95,14 @@ def cfar_required_snr(
     model: str = "swerling1",
 ) -> float:
     """Return the mean SNR per pulse at which a cell-averaging CFAR detector has Pd `pd`, linear."""
-    wanted = float(checked_probability("pd", pd))
-    count, pfa, n = _checked(reference_cells, false_alarm_probability, pulses)
+    wanted = float(check_probability("pd", pd))
+    count, pfa, n = _check_arguments(reference_cells, false_alarm_probability, pulses)
     if wanted <= pfa:
         raise ValueError(
             f"pd is {wanted:g}: it must be above the false alarm probability, {pfa:g}, which noise "
             "alone reaches"
         )
-    return _required(wanted, count, pfa, n, checked_model(model))
+    return _solve_required(wanted, count, pfa, n, check_model(model))
 
 
 def cfar_loss_db(
@@ -139,7 +139,7 @@ class _Terms:
     log_factorial: FloatArray
 
 
-def _checked(
+def _check_arguments(
     reference_cells: int, false_alarm_probability: float, pulses: int
 ) -> tuple[int, float, int]:
     whole = not isinstance(reference_cells, bool) and int(reference_cells) == reference_cells
@@ -148,8 +148,8 @@ def _checked(
             f"reference_cells is {reference_cells!r}: it must be a whole number from "
             f"{FEWEST_CELLS} to {MOST_CELLS}"
         )
-    pfa = float(checked_probability("false_alarm_probability", false_alarm_probability))
-    return int(reference_cells), pfa, int(checked_pulses(pulses))
+    pfa = float(check_probability("false_alarm_probability", false_alarm_probability))
+    return int(reference_cells), pfa, int(check_pulses(pulses))
 
 
 @lru_cache(maxsize=256)
@@ -203,11 +203,11 @@ def _probability(snr: FloatArray, terms: _Terms, model: str) -> FloatArray:
     step = max(1, _AT_ONCE // len(terms.missed))
     for first in range(0, len(finite), step):
         some = finite[first : first + step]
-        result[some] = _summed(n * snr[some], shape, terms)
+        result[some] = _sum_terms(n * snr[some], shape, terms)
     return result
 
 
-def _summed(quanta: FloatArray, shape: float, terms: _Terms) -> FloatArray:
+def _sum_terms(quanta: FloatArray, shape: float, terms: _Terms) -> FloatArray:
     """Return Pd for mean numbers of quanta; the smaller of Pd and 1 - Pd is the one summed."""
     from scipy.special import gammaln, xlogy
 
@@ -227,7 +227,7 @@ def _summed(quanta: FloatArray, shape: float, terms: _Terms) -> FloatArray:
 
 
 @lru_cache(maxsize=1024)
-def _required(wanted: float, cells: int, pfa: float, pulses: int, model: str) -> float:
+def _solve_required(wanted: float, cells: int, pfa: float, pulses: int, model: str) -> float:
     terms = _terms(cells, pfa, pulses)
     if pulses == 1 and model in ("swerling1", "swerling2"):
         return terms.multiplier / math.expm1(-math.log(wanted) / cells) - 1.0

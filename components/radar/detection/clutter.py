@@ -40,9 +40,9 @@ from numpy.typing import ArrayLike
 from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
-    checked_model,
-    checked_probability,
-    not_negative,
+    check_model,
+    check_not_negative,
+    check_probability,
     one_of,
     refuse,
     unflatten,
@@ -145,10 +145,10 @@ def clutter_detection_probability(
     clutter: a mean over 64 phases, good to 1e-14 while the weaker of the two is below 20 dB, to
     1e-8 at 25 dB and 1e-4 at 30 dB.
     """
-    name = checked_model(model)
+    name = check_model(model)
     kind = one_of("clutter", clutter, KINDS)
     rises = one_of("threshold", threshold, ("noise", "adaptive")) == "adaptive"
-    pfa = checked_probability("false_alarm_probability", false_alarm_probability)
+    pfa = check_probability("false_alarm_probability", false_alarm_probability)
     refuse(
         "false_alarm_probability",
         pfa,
@@ -156,9 +156,9 @@ def clutter_detection_probability(
         "be one number of at least 1e-100",
     )
     shape, (target, mean, diffuse) = broadcast_flat(
-        snr=not_negative("snr", snr),
-        cnr=not_negative("cnr", cnr),
-        diffuse_cnr=not_negative("diffuse_cnr", diffuse_cnr),
+        snr=check_not_negative("snr", snr),
+        cnr=check_not_negative("cnr", cnr),
+        diffuse_cnr=check_not_negative("diffuse_cnr", diffuse_cnr),
     )
     level = -math.log(float(pfa)) if noise_threshold is None else float(noise_threshold)
     result = np.empty_like(target)

@@ -39,7 +39,7 @@ _NEGLIGIBLE = 1e-18
 def geometric_gain(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArray:
     """Return Pd for K = 1 or 2; `echo` is n·SNR (flat array)."""
     q, r = _odds(echo / shape)
-    term = noise.term[: _kept(noise)]
+    term = noise.term[: _count_noise_terms(noise)]
     total = _polynomial(term, q)
     if shape == 2:
         # Pr(N > i) = q^(i+1) (1 + (i+1) r)
@@ -50,7 +50,7 @@ def geometric_gain(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArra
 def geometric_miss(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArray:
     """Return 1 - Pd for K = 1 or 2; `echo` is n·SNR (flat array)."""
     q, r = _odds(echo / shape)
-    missed = noise.missed[: _kept(noise)]
+    missed = noise.missed[: _count_noise_terms(noise)]
     if shape == 2:
         return _polynomial(missed * np.arange(1.0, missed.size + 1.0), q) * r * r
     return _polynomial(missed, q) * r
@@ -62,7 +62,7 @@ def _odds(scale: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.where(scale < 1.0, np.minimum(scale, 1.0) * r, 1.0 - r), r
 
 
-def _kept(noise: NoiseTerms) -> int:
+def _count_noise_terms(noise: NoiseTerms) -> int:
     """Count the noise terms that matter beside the first ones."""
     small = np.flatnonzero(noise.missed < _NEGLIGIBLE * noise.missed[0])
     return int(small[0]) + 1 if small.size else noise.missed.size

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from components.arguments.checks import (
     FloatArray,
-    as_numbers,
     broadcast_flat,
-    checked_model,
-    checked_probability,
-    checked_pulses,
+    check_model,
+    check_numbers,
+    check_probability,
+    check_pulses,
     refuse,
     unflatten,
 )
@@ -55,11 +55,11 @@ def measured_snr(
     fluctuating targets", IRE Trans. IT-6(2), 1960. A noncentral one of more than 50 dB has a normal
     amplitude.
     """
-    count, name = int(checked_pulses(pulses)), checked_model(model)
+    count, name = int(check_pulses(pulses)), check_model(model)
     shape, (share, mean, level) = broadcast_flat(
-        tail=as_numbers("tail", tail),
-        snr=as_numbers("snr", snr),
-        threshold=as_numbers("threshold", threshold),
+        tail=check_numbers("tail", tail),
+        snr=check_numbers("snr", snr),
+        threshold=check_numbers("threshold", threshold),
     )
     refuse("tail", share, ~((share >= 0.0) & (share <= 1.0)), "lie in [0, 1]")
     refuse("snr", mean, ~((mean >= 0.0) & np.isfinite(mean)), "be 0 or more")
@@ -67,11 +67,11 @@ def measured_snr(
     # A share of 0 is that of a draw below the last digit of a uniform number.
     share = np.maximum(share, 2.0**-54)
     with np.errstate(under="ignore"):  # far tails are 0
-        output = _beyond(share, mean, level, count, name)
+        output = _survival_at_share(share, mean, level, count, name)
     return unflatten(np.maximum(output, level) / count - 1.0, shape)
 
 
-def _beyond(
+def _survival_at_share(
     share: FloatArray, snr: FloatArray, threshold: FloatArray, pulses: int, model: str
 ) -> FloatArray:
     if pulses == 1 and model in ("swerling1", "swerling2"):
@@ -80,14 +80,14 @@ def _beyond(
     # Without a trace of an echo all models are noise.
     gamma = (pulses * snr < _TRACE) | (model == "swerling2")
     scale = 1.0 + snr[gamma]
-    output[gamma] = scale * _gamma_beyond(share[gamma], threshold[gamma] / scale, pulses)
+    output[gamma] = scale * _gamma_survival_quantile(share[gamma], threshold[gamma] / scale, pulses)
     rest = ~gamma
-    solve = _steady_beyond if model == "swerling0" else _solved_beyond
+    solve = _steady_survival_quantile if model == "swerling0" else _solve_survival
     output[rest] = solve(share[rest], snr[rest], threshold[rest], pulses, model)
     return output
 
 
-def _gamma_beyond(share: FloatArray, threshold: FloatArray, pulses: int) -> FloatArray:
+def _gamma_survival_quantile(share: FloatArray, threshold: FloatArray, pulses: int) -> FloatArray:
     from scipy.special import gammaincc, gammainccinv
 
     beyond = gammaincc(float(pulses), threshold)
@@ -96,7 +96,7 @@ def _gamma_beyond(share: FloatArray, threshold: FloatArray, pulses: int) -> Floa
     return np.where(np.isfinite(output), output, threshold - np.log(share))
 
 
-def _steady_beyond(
+def _steady_survival_quantile(
     share: FloatArray, snr: FloatArray, threshold: FloatArray, pulses: int, model: str
 ) -> FloatArray:
     from scipy.special import chndtr, chndtrix, ndtr, ndtri
@@ -117,7 +117,7 @@ def _steady_beyond(
     return output
 
 
-def _solved_beyond(
+def _solve_survival(
     share: FloatArray, snr: FloatArray, threshold: FloatArray, pulses: int, model: str
 ) -> FloatArray:
     """Halve the interval in which the survival function is so much of that at the threshold."""
@@ -190,15 +190,15 @@ def false_alarm_count(uniform: ArrayLike, *, cells: int, false_alarm_probability
     are normalised by their own sum, so that no factorial of a large number is needed; counts with a
     probability below 1e-20 of the largest are left out. One table per (cells, Pfa), remembered.
     """
-    number = _checked_cells(cells)
-    pfa = as_numbers("false_alarm_probability", false_alarm_probability)
+    number = _check_cells(cells)
+    pfa = check_numbers("false_alarm_probability", false_alarm_probability)
     refuse(
         "false_alarm_probability",
         pfa,
         np.atleast_1d(~((pfa >= 0.0) & (pfa <= 1.0)) | (pfa.ndim > 0)),
         "be one number in [0, 1]",
     )
-    draws = _checked_uniform("uniform", uniform)
+    draws = _check_uniform("uniform", uniform)
     if number * float(pfa) > MOST_FALSE_ALARMS:
         raise ValueError(
             f"false_alarm_probability is {float(pfa):g}: with {number:g} cells it must be at most "
@@ -222,20 +222,20 @@ def false_alarm_snr(
     One uniform number in [0, 1) each; the threshold follows from the probability where it is not
     given. Detector output over its mean, minus 1; linear, per pulse, never below 0.
     """
-    draws = _checked_uniform("uniform", uniform)
+    draws = _check_uniform("uniform", uniform)
     if threshold is None:
-        pfa = float(checked_probability("false_alarm_probability", false_alarm_probability))
-        threshold = float(detection_threshold(checked_pulses(pulses), pfa))
+        pfa = float(check_probability("false_alarm_probability", false_alarm_probability))
+        threshold = float(detection_threshold(check_pulses(pulses), pfa))
     return np.maximum(measured_snr(1.0 - draws, 0.0, threshold=threshold, pulses=pulses), 0.0)
 
 
-def _checked_uniform(name: str, value: ArrayLike) -> FloatArray:
-    array = as_numbers(name, value)
+def _check_uniform(name: str, value: ArrayLike) -> FloatArray:
+    array = check_numbers(name, value)
     refuse(name, array, ~((array >= 0.0) & (array < 1.0)), "lie in [0, 1)")
     return array
 
 
-def _checked_cells(cells: int) -> int:
+def _check_cells(cells: int) -> int:
     if isinstance(cells, bool) or int(cells) != cells or not 0 <= cells <= MOST_CELLS:
         raise ValueError(f"cells is {cells!r}: it must be a whole number from 0 to 1e15")
     return int(cells)

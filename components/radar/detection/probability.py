@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     FloatArray,
-    as_numbers,
     broadcast_flat,
-    checked_model,
-    checked_probability,
-    checked_pulses,
-    checked_snr,
+    check_model,
+    check_numbers,
+    check_probability,
+    check_pulses,
+    check_snr,
     one_of,
     refuse,
     unflatten,
@@ -141,9 +141,9 @@ def _probability(
     *,
     miss: bool,
 ) -> Any:
-    name = checked_model(model)
+    name = check_model(model)
     one_of("method", method, METHODS)
-    shape, ratio, groups = _group(checked_snr(snr), pulses, false_alarm_probability)
+    shape, ratio, groups = _group(check_snr(snr), pulses, false_alarm_probability)
     result = np.empty_like(ratio)
     # Tiny SNR and probabilities fade to 0; that is their value, not an error.
     with np.errstate(under="ignore"):
@@ -161,8 +161,8 @@ def _group(
     snr: FloatArray, pulses: ArrayLike, false_alarm_probability: ArrayLike
 ) -> tuple[tuple[int, ...], FloatArray, list[tuple[Any, float, float]]]:
     """Return the shape, flat SNR, and which elements have which pulses and false alarms."""
-    n = checked_pulses(pulses)
-    pfa = checked_probability("false_alarm_probability", false_alarm_probability)
+    n = check_pulses(pulses)
+    pfa = check_probability("false_alarm_probability", false_alarm_probability)
     if n.ndim == 0 and pfa.ndim == 0:
         flat = np.ascontiguousarray(snr).reshape(-1)
         return snr.shape, flat, [(slice(None), float(n), float(pfa))]
@@ -204,20 +204,20 @@ def required_snr(
     Swerling I (and II) with one pulse in closed form, from Pd = Pfa^(1/(1+SNR)); the others by
     repeated subdivision of ln SNR.
     """
-    wanted = float(checked_probability("pd", pd))
-    pfa = float(checked_probability("false_alarm_probability", false_alarm_probability))
-    n = int(checked_pulses(pulses))
-    name = checked_model(model)
+    wanted = float(check_probability("pd", pd))
+    pfa = float(check_probability("false_alarm_probability", false_alarm_probability))
+    n = int(check_pulses(pulses))
+    name = check_model(model)
     if wanted <= pfa:
         raise ValueError(
             f"pd is {wanted:g}: it must be above the false-alarm probability {pfa:g}, which noise "
             "alone reaches"
         )
-    return _solved(wanted, pfa, n, name)
+    return _solve_snr(wanted, pfa, n, name)
 
 
 @lru_cache(maxsize=1024)
-def _solved(wanted: float, pfa: float, n: int, name: str) -> float:
+def _solve_snr(wanted: float, pfa: float, n: int, name: str) -> float:
     if n == 1 and name in ("swerling1", "swerling2"):
         return math.log(pfa / wanted) / math.log(wanted)
     low, high = math.log(1e-30), math.log(1e30)
@@ -245,7 +245,7 @@ def _solved(wanted: float, pfa: float, n: int, name: str) -> float:
 MOST_LOOKS = 12
 
 
-def first_declared(pd: ArrayLike, m: int = 1, n: int = 1) -> FloatArray:
+def first_declaration_probability(pd: ArrayLike, m: int = 1, n: int = 1) -> FloatArray:
     """Return the probability that m detections within n looks are first there at each look.
 
     Looks are independent, as those of scan-to-scan fluctuation are. Before the first look there
@@ -277,7 +277,7 @@ def first_declared(pd: ArrayLike, m: int = 1, n: int = 1) -> FloatArray:
     """
     if not (1 <= m <= n <= MOST_LOOKS):
         raise ValueError(f"m is {m} and n is {n}: they must be 1 <= m <= n <= {MOST_LOOKS}")
-    chance = as_numbers("pd", pd)
+    chance = check_numbers("pd", pd)
     refuse("pd", chance, ~((chance >= 0.0) & (chance <= 1.0)), "lie in [0, 1]")
     states = 2 ** (n - 1)
     seen = np.array([state.bit_count() for state in range(states)])

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
-    checked_probability,
-    checked_pulses,
+    check_probability,
+    check_pulses,
     unflatten,
 )
 
@@ -127,8 +127,8 @@ def detection_threshold(pulses: ArrayLike, false_alarm_probability: ArrayLike) -
     of arguments is solved once and remembered.
     """
     shape, (n, pfa) = broadcast_flat(
-        pulses=checked_pulses(pulses),
-        false_alarm_probability=checked_probability(
+        pulses=check_pulses(pulses),
+        false_alarm_probability=check_probability(
             "false_alarm_probability", false_alarm_probability
         ),
     )
@@ -196,14 +196,14 @@ class Crossing:
 
     @classmethod
     @lru_cache(maxsize=256)
-    def of(cls, pulses: int, false_alarm_probability: float) -> Crossing:
-        """Return that of a threshold which noise crosses so often."""
+    def from_false_alarms(cls, pulses: int, false_alarm_probability: float) -> Crossing:
+        """Return the crossing of the threshold with this probability of false alarm."""
         threshold = float(detection_threshold(pulses, false_alarm_probability))
         return cls(pulses, false_alarm_probability, threshold)
 
     @classmethod
     @lru_cache(maxsize=256)
-    def at(cls, pulses: int, snr_db: float) -> Crossing:
+    def from_snr(cls, pulses: int, snr_db: float) -> Crossing:
         """Return that of a threshold on the SNR of a pulse, as the output over noise less 1."""
         from scipy.special import gammaincc
 

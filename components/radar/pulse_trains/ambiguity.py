@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
+    check_not_negative,
     finite,
-    not_negative,
     positive,
     refuse,
     unflatten,
@@ -63,7 +63,7 @@ def received_share(range_m: ArrayLike, *, prf_hz: float, pulse_width_s: float) -
         "pulse_width_s", np.asarray(width_s), np.asarray(width_s > interval_s),
         f"be at most the pulse interval, {interval_s:g} s",
     )  # fmt: skip
-    shape, (distance,) = broadcast_flat(range_m=not_negative("range_m", range_m))
+    shape, (distance,) = broadcast_flat(range_m=check_not_negative("range_m", range_m))
     after_s = np.mod(2.0 * distance / SPEED_OF_LIGHT_M_S, interval_s)
     share = np.minimum(1.0, after_s / width_s) + np.minimum(1.0, (interval_s - after_s) / width_s)
     return unflatten(np.clip(share - 1.0, 0.0, 1.0), shape)
@@ -155,9 +155,9 @@ def prfs_in_the_clear(
         `least_share` s, 1 - 2 s τ/T of all delays.
     """
     positive("wavelength_m", wavelength_m)
-    notch = float(not_negative("notch_m_s", notch_m_s))
+    notch = float(check_not_negative("notch_m_s", notch_m_s))
     shape, (distance, rate) = broadcast_flat(
-        range_m=not_negative("range_m", range_m),
+        range_m=check_not_negative("range_m", range_m),
         range_rate_m_s=finite("range_rate_m_s", range_rate_m_s),
     )
     count = np.zeros(distance.shape, dtype=np.int64)

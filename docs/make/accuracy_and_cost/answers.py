@@ -11,7 +11,7 @@ from pathlib import Path
 from dsa_des.answers.report import HEADS, AnswerReport
 from dsa_des.commands.cost import CostProgress
 from dsa_des.commands.cost_answer import AnswerOfStudy
-from dsa_des.scene.examples import chosen_file
+from dsa_des.scene.examples import find_input_file
 from dsa_des.studies.study_file import read_study
 from dsa_des.text.safe_text import shell_line
 
@@ -60,7 +60,7 @@ def reports(workers: int, studies: Sequence[AskedStudy] = STUDIES) -> list[Answe
     """Run all studies with all their models."""
     made = []
     for asked in studies:
-        study = read_study(chosen_file(asked.study, "study"), sets=asked.sets)
+        study = read_study(find_input_file(asked.study, "study"), sets=asked.sets)
         answer = AnswerOfStudy(study, asked.answers, asked.block, asked.listed, asked.budgets)
         with tempfile.TemporaryDirectory() as folder:
             if answer.run(Path(folder), workers, CostProgress(silent=False)):
@@ -104,7 +104,7 @@ def _tables(report: AnswerReport) -> list[str]:
         ]
         said = beside_the_table(report.sentences(result.name), same)
         lines += ["", *(f"{line}\n" for line in said)]
-    return [*lines, *(f"{line}  " for line in report.about()), ""]
+    return [*lines, *(f"{line}  " for line in report.notes_on_tables()), ""]
 
 
 #: Sentences that list what the head of the page, or the column of verdicts, shows.

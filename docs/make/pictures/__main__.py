@@ -53,13 +53,17 @@ intruder = [np.interp(frame_s, logged_s, values) for values in logged]
 mounting = np.radians([7.0, -3.0, -12.0])
 
 body = ned_to_body(*line_of_sight_ned(*own, *intruder), *attitude)
-camera = Pinhole.calibrated((1180.0, 1175.0), (1010.0, 540.0), columns=2048, rows=1024)
+camera = Pinhole.from_intrinsics((1180.0, 1175.0), (1010.0, 540.0), columns=2048, rows=1024)
 column, row = camera.pixel(*body_angles(*ned_to_body(*body, *mounting)))
 ```"""
 
 _HEAD = """# Image-based camera
 
-`dsa-des run optical/pictures`, with `pip install 'dsa-des[image]'`
+What does a camera's detector make of a rendered picture? With `pip install 'dsa-des[image]'`:
+
+> `dsa-des run optical/pictures`
+
+![Patches as the camera saw them](images/{seen})
 
 `optical.image` renders the image of an electro-optical camera around every target, and searches
 it for the target. It takes the keys of `optical.eo`. Each look is two frames: the target's
@@ -68,8 +72,6 @@ outline with exact coverage of pixels, its smear over `exposure_s`, the blur, a 
 whose position is reported; detections have `column_px`, `row_px`, and the flow of the target
 between the frames in pixels, `flow_column_px` and `flow_row_px`, with the turn of the line of
 sight that follows from it, `flow_rate_rad_s`. The operator's display shows the patch.
-
-![Patches as the camera saw them](images/{seen})
 
 **Pixels of a flown run.** The camera is a pinhole model, so `true_column_px` and `true_row_px`
 give a target's position in a frame of any field of view, size and mounting. A file of flights

@@ -28,7 +28,7 @@ def matched_snr(pixels: float, noise: float) -> float:
     """Return the SNR of a disc behind the filter that is matched to it, wherever it falls.
 
     In the mean over places in a pixel: by the spectrum of a disc, the blur and a pixel, which
-    does not know `filtered_share`.
+    does not know `point_filter_share`.
     """
     wave = np.linspace(-40.0, 40.0, 1601)
     across, upward = np.meshgrid(wave, wave)

@@ -12,7 +12,7 @@ from typing import Any
 from components.formats.csv_file import csv_columns
 from components.formats.daa_file import daa_columns
 from docs.make.reference.parameter_tables import MARK, ParameterTables, mark_changing
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.message import Column, Message
 from dsa_des.block.recorded_columns import LEADING
 from dsa_des.block.registry import find
@@ -40,7 +40,7 @@ _KEY = ("key", "type", "unit", "default", "meaning")
 def recorded_tables() -> dict[str, dict[str, Column]]:
     """Return table → column of all that registered blocks and processors record."""
     messages: list[type[Message]] = [Processing]
-    for name in registered():
+    for name in entry_points_of():
         messages += [output.message for output in find(name).outputs.values()]
         messages += find(name).also_records
     found: dict[str, dict[str, Column]] = {}
@@ -68,9 +68,9 @@ def page() -> str:
     parts = [_HEAD, "## Scene files\n"]
     for name, (what, rows) in scene_tables().items():
         parts += [f"### {name}\n", f"{what}\n", _table(_KEY, map(mark_changing, rows()))]
-    tables = ParameterTables(find(name).Parameters for name in registered())
+    tables = ParameterTables(find(name).Parameters for name in entry_points_of())
     parts.append("## Blocks\n")
-    for name in registered():
+    for name in entry_points_of():
         cls = find(name)
         doc = inspect.cleandoc(cls.__doc__ or "").split("\n\n")[0].replace("\n", " ")
         parts += [f"### {name}\n", f"{doc}\n"]

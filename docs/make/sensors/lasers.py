@@ -12,7 +12,7 @@ from components.laser.link import (
     shots_on_target,
     wire_share,
 )
-from components.optical.detection import deviations_exceeded
+from components.optical.detection import deviations_of_exceedance
 
 LASER = Path(__file__).parents[3] / "configs/sensors/wire_laser.toml"
 #: Published: a name, the wire's diameter (mm) and the range from which it is detected (m).
@@ -36,7 +36,7 @@ def wire_within_a_second(diameter_mm: float, range_m: float, power: float = 1.0)
         length_rad * thick_m / range_m, 0.25 * np.pi * length_rad * beam_rad,
         width * height / (p["azimuth_shots"] * p["elevation_shots"]),
     )  # fmt: skip
-    threshold = deviations_exceeded(p["false_alarm_probability"])
+    threshold = deviations_of_exceedance(p["false_alarm_probability"])
     pd = scan_detection_probability(
         echo_w / p["noise_equivalent_power_w"], shots, threshold=threshold
     )

@@ -16,7 +16,7 @@ from components.surveillance.reception import (
     AIRCRAFT_AROUND,
     AIRPORTS_AROUND,
     FITTED_RANGE_M,
-    fitted,
+    fitted_reception_probability,
 )
 from dsa_des.block.mark import BLUE, ORANGE
 from dsa_des.record.drawing import drawing
@@ -45,7 +45,7 @@ def curves(parameters: Any, aircraft: float, airports: float) -> Any:
 
 def off_percent(parameters: Any, aircraft: float, airports: float) -> Any:
     """Return how far the law is off each receiver's regression, rms over range, %."""
-    law = fitted(_X * FITTED_RANGE_M, aircraft, airports)
+    law = fitted_reception_probability(_X * FITTED_RANGE_M, aircraft, airports)
     return 100.0 * np.sqrt(((curves(parameters, aircraft, airports) - law) ** 2).mean(axis=1))
 
 
@@ -74,7 +74,12 @@ def draw(path: Path, out: Path) -> None:
             for row, curve in zip(rows, curves(parameters, *around), strict=True):
                 make = ORANGE if row["Sensor Type"] == "Radarcape" else "0.7"
                 axes.plot(range_nmi, curve, color=make, linewidth=0.7)
-            axes.plot(range_nmi, fitted(_X * FITTED_RANGE_M, *around), color=BLUE, linewidth=2.0)
+            axes.plot(
+                range_nmi,
+                fitted_reception_probability(_X * FITTED_RANGE_M, *around),
+                color=BLUE,
+                linewidth=2.0,
+            )
             axes.set_title(f"{around[0]:g} aircraft, {around[1]:g} airports", fontsize=9)
             axes.set_xlabel("range (nmi)")
         figure.axes[0].set_ylabel("probability of reception")

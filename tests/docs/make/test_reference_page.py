@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from docs.make.reference.__main__ import page, recorded_tables
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.recorded_columns import LEADING
 from dsa_des.block.registry import find, section_models
 from dsa_des.cli import main
@@ -49,7 +49,7 @@ def test_every_key_of_every_block_follows_from_its_table_and_the_links():
                     shared |= {row for row in found(link, prefix) if row[0] not in names}
         return own | inner | shared
 
-    for name in registered():
+    for name in entry_points_of():
         rows = parameter_rows(find(name).Parameters)
         asked = {tuple(cell.strip().replace("|", "\\|") for cell in row) for row in rows}
         assert found(name) == asked, name

@@ -10,7 +10,7 @@ import dsa_des
 from components.encounters import encounter_traffic
 from components.encounters.encounter_traffic import MadeTogether
 from dsa_des.replicas import replicas
-from dsa_des.replicas.replicas import most_together
+from dsa_des.replicas.replicas import largest_lock_step
 from tests.encounters.test_pairing import GAS
 
 RUNS = 1300
@@ -42,7 +42,7 @@ def test_a_chunk_beyond_any_cache_makes_each_encounter_once(
         "type": "traffic.encounter_model", "file": str(tmp_path / "model.txt"),
         "lat_deg": 52, "lon_deg": 4,
     }  # fmt: skip
-    assert most_together(dsa_des.load_scene(scene)) < RUNS
+    assert largest_lock_step(dsa_des.load_scene(scene)) < RUNS
     study = dsa_des.study(
         scene, metrics=["encounter_weight", "closest_approach"], replicas=RUNS, workers=1,
         draws={"blocks.traffic.encounter": {"sequence": [0, 1]}}, runs_per_chunk=RUNS,

@@ -280,12 +280,14 @@ def test_the_encounters_own_ownship_flies_in_a_scene_that_had_another(swapped, t
 
 def misses(traffic: dict, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return signed horizontal and vertical miss distances of encounters, and their weights."""
-    from components.encounters.encounter_traffic import ModelTraffic, chosen_encounter
+    from components.encounters.encounter_traffic import ModelTraffic, encounter_of_parameters
 
     ModelTraffic.prepare([ModelTraffic.Parameters(**traffic, encounter=k) for k in range(count)])
     found = []
     for k in range(count):
-        one, place = chosen_encounter(ModelTraffic, ModelTraffic.Parameters(**traffic, encounter=k))
+        one, place = encounter_of_parameters(
+            ModelTraffic, ModelTraffic.Parameters(**traffic, encounter=k)
+        )
         found.append([float(one.extra[n][place]) for n in ("horizontal_miss_m", "vertical_miss_m")]
                      + [float(one.weights[place])])  # fmt: skip
     table = np.array(found)

@@ -7,13 +7,13 @@ import pytest
 import recorded_files as write
 from click.testing import CliRunner, Result
 
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.cli import main
 from dsa_des.scene.data_files import GROUP
 
 START = 1_717_243_200.0
 pytestmark = pytest.mark.skipif(
-    not registered(GROUP), reason="there is no entry point: install the project again"
+    not entry_points_of(GROUP), reason="there is no entry point: install the project again"
 )
 NORTHBOUND = [(START + k, 47.0 + 4e-4 * k, 8.0, 1000.0) for k in range(60)]
 SOUTHBOUND = [(START + k, 47.04 - 4e-4 * k, 8.001, 1010.0) for k in range(60)]

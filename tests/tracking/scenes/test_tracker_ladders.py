@@ -9,7 +9,7 @@ from wired import chain
 import dsa_des
 from components.track_fusion.covariance_intersection import RULE
 from components.tracking.ladder import FILTER, LADDERS, LATENESS
-from dsa_des.costs.replay import errors_against, own_errors, run_rung, values_of
+from dsa_des.costs.replay import errors_against, errors_against_precise, run_rung, values_of
 
 RADAR = {
     "type": "radar.range_boundary", "scan_rate_hz": 4, "range_km": 20.0, "errors": "stated",
@@ -71,7 +71,7 @@ def test_late_looks_that_are_worked_on_are_rows_of_their_own():
     assert rows["rerun"] > rows["drop"] > 0
     spread = errors_against(LATENESS, found["drop"], found["rerun"])
     assert 0.0 < spread["position"].mean < 30.0
-    own, said = own_errors(LATENESS, run, found["rerun"])
+    own, said = errors_against_precise(LATENESS, run, found["rerun"])
     assert own["position"].mean == pytest.approx(np.nanmean(found["rerun"][1]["position"]))
     assert "measured" in said
     assert {ladder.name for ladder in LADDERS} == {"filter", "association", "lateness"}

@@ -11,15 +11,15 @@ from components.flights.closest_approach import KnownTimes
 from components.traffic.files import FileTraffic, FileTrafficParameters
 from components.traffic.scripted import ScriptedParameters, ScriptedTraffic
 from dsa_des.block.component import Context
-from dsa_des.block.entry_points import registered
+from dsa_des.block.entry_points import entry_points_of
 from dsa_des.errors import SceneError
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Streams
 
 #: The names that it goes by; an environment that was made before has not all of them.
 NAMES = tuple(
-    name for name, point in registered().items() if point.value.startswith("components.traffic.fil")
-    and name != "traffic.daa_file"
+    name for name, point in entry_points_of().items()
+    if point.value.startswith("components.traffic.fil") and name != "traffic.daa_file"
 )  # fmt: skip
 START = 1_717_243_200.0
 

@@ -258,7 +258,7 @@ def test_many_flights_together_by_differences_of_their_positions():
         which = np.tile(np.arange(shape[1]), shape[0])
         times = np.repeat(time_s, shape[1])
         found = FlownFlights({-1: own}, targets, [Crabbing(wind)]).targets_at(which, times)
-        found = found.reshaped(shape)
+        found = found.reshape(shape)
         for place, flight in enumerate(targets):
             a, b = flight.at(time_s - 0.05), flight.at(time_s + 0.05)
             east, north, up = pymap3d.geodetic2enu(

@@ -38,7 +38,7 @@ class Instance:
         self._functions: dict[str, Any] = {}
         options: dict[str, Any] = {}
         if self.three:
-            options["logMessage"] = self._logged
+            options["logMessage"] = self._keep_log
             if spec["kind"] == "cs":
                 options |= {"eventModeUsed": spec["events"], "earlyReturnAllowed": spec["events"]}
         else:
@@ -99,7 +99,7 @@ class Instance:
             self._functions[name] = found
         return self._functions[name]
 
-    def _logged(self, _: Any, status: int, category: bytes, message: bytes) -> None:
+    def _keep_log(self, _: Any, status: int, category: bytes, message: bytes) -> None:
         self.log.append(message.decode(errors="replace").strip())
 
     def _logged2(self, _: Any, __: Any, status: int, category: bytes, message: bytes) -> None:
@@ -121,9 +121,9 @@ class Instance:
         structural = [start for start in spec["start"] if start[3]]
         if structural:
             fmu.enterConfigurationMode()
-            self._put(structural)
+            self._set_starts(structural)
             fmu.exitConfigurationMode()
-        self._put([start for start in spec["start"] if not start[3]])
+        self._set_starts([start for start in spec["start"] if not start[3]])
         if self.three:
             fmu.enterInitializationMode(startTime=time_s)
         else:
@@ -133,7 +133,7 @@ class Instance:
         fmu.exitInitializationMode()
         self.started = True
 
-    def _put(self, starts: Any) -> None:
+    def _set_starts(self, starts: Any) -> None:
         for kind, reference, values, _ in starts:
             ValueGroup(self, kind, [(reference, len(values))], "Set").put(values)
 
