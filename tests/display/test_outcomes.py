@@ -61,7 +61,7 @@ class Still:
 
     names = ("a", "b")
 
-    def at(self, time_s):
+    def positions_at(self, time_s):
         place = np.zeros((2, 3, len(time_s)))
         place[1, 0] = np.where(time_s < 5.0, 1000.0, np.nan)
         return place

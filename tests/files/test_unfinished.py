@@ -16,8 +16,8 @@ from dsa_des.files.output_folder import OutputFolder
 DYING = """
 import os, signal
 from pathlib import Path
-from dsa_des.files.output_file import unfinished
-with unfinished(Path("{name}")) as folder:
+from dsa_des.files.output_file import temporary_folder
+with temporary_folder(Path("{name}")) as folder:
     (folder / "half").write_text("x")
     {more}
     os.kill(os.getpid(), signal.SIGKILL)
@@ -45,7 +45,7 @@ def test_the_next_run_into_the_same_place_removes_what_a_killed_one_left(tmp_pat
 
 def test_what_a_living_process_is_at_stays(tmp_path):
     with temporary_folder(tmp_path / "run") as folder:
-        code = f"from dsa_des.files.output_file import *; remove_left_over(Path({str(tmp_path)!r}))"
+        code = f"from dsa_des.files.output_file import *; remove_abandoned(Path({str(tmp_path)!r}))"
         subprocess.run([sys.executable, "-c", code], check=True)
         remove_abandoned(tmp_path)  # not even this process takes it for left over
         assert left_in(folder) == ["lock"]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from components.fusion.gated import Entries, Gates, carried, nearest_in_gate
+from components.fusion.gated import Entries, Gates, extrapolate_entries, nearest_in_gate
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -98,12 +98,14 @@ def test_what_was_measured_earlier_is_carried_by_how_the_ownship_moved():
     ):
         one = entry(0.0, 2000.0, 110, 110, after)
         other = entry(azimuth_deg, range_m, 100, 100, before, rate_mps)
-        azimuth, elevation, found_m = carried(one, np.zeros(1, int), other, np.zeros(1, int), 5)
+        azimuth, elevation, found_m = extrapolate_entries(
+            one, np.zeros(1, int), other, np.zeros(1, int), 5
+        )
         np.testing.assert_allclose(
             [np.degrees(azimuth[0]), found_m[0]], wanted, rtol=1e-6, atol=1e-6
         )
         assert abs(elevation[0]) < 1e-5
-    same = carried(
+    same = extrapolate_entries(
         one, np.zeros(1, int), entry(30.0, 7.0, 110, 110, before, 9.0), np.zeros(1, int), 5
     )
     assert [part.tolist() for part in same] == [[np.radians(30.0)], [0.0], [7.0]]

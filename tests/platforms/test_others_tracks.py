@@ -130,7 +130,7 @@ def test_of_two_at_ones_own_place_the_nearer_is_oneself():
     state, velocity = of_own(turn, 0.0)
     p = np.diag([1e4] * 3 + [25.0] * 3)
     beside = state + np.array([80.0, 0, 0, 0, 0, 0])
-    tracks = KeyedTable.joined([one_track(beside, p), one_track(state, p)])
+    tracks = KeyedTable.concatenate([one_track(beside, p), one_track(state, p)])
     own = np.array(
         [[np.radians(OWN["lat_deg"])] * 2, [np.radians(OWN["lon_deg"])] * 2, [900.0] * 2]
     )

@@ -161,10 +161,12 @@ def test_decisions_of_rows_are_taken_widened_and_joined_by_hand():
         part = whole.take_rows(some)
         assert part.rows.tolist() == kept and part.reason.tolist() == reasons
         assert part.count == len(np.arange(5)[some])
-    assert whole.at(whole.rows) is reason and whole.at(np.array([0, 2, 3])) is reason
-    assert whole.at(np.array([3, 0])).tolist() == [[5, 6], [1, 2]]
-    assert whole.at(np.array([0, 1])) is None
-    wide = whole.widened(np.array([3, 1]), 4)
+    assert (
+        whole.reasons_at(whole.rows) is reason and whole.reasons_at(np.array([0, 2, 3])) is reason
+    )
+    assert whole.reasons_at(np.array([3, 0])).tolist() == [[5, 6], [1, 2]]
+    assert whole.reasons_at(np.array([0, 1])) is None
+    wide = whole.widen(np.array([3, 1]), 4)
     assert wide.reason.tolist() == [[ABSENT, b, ABSENT, a] for a, b in reason.tolist()]
     assert wide.rows.tolist() == [0, 2, 3] and wide.count == 5
     both = Decision.join_rows([whole, whole.take_rows(slice(2, 5))])

@@ -15,7 +15,7 @@ from dsa_des.results.folder import StudyFolder, undone_of
 from dsa_des.results.record import CRASHED, DONE
 from dsa_des.studies import executors
 from dsa_des.studies.attempts import TRIES, Attempts, halves
-from dsa_des.studies.chunk import Done, done_of, joined
+from dsa_des.studies.chunk import Done, done_of, join_pieces
 from dsa_des.studies.executors import Local
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import run_study
@@ -212,7 +212,7 @@ def test_a_part_says_what_its_runs_are_and_what_blocks_could_not_do() -> None:
     silent = part([4], ["done"], {})
     table = pq.read_table(pa.BufferReader(silent.content))
     assert (silent.runs, silent.failed, silent.crashed, undone_of(table)) == (1, 0, 0, {})
-    whole = joined("whole", [silent, replace(first, cpu_s=2.5), first])
+    whole = join_pieces("whole", [silent, replace(first, cpu_s=2.5), first])
     table = pq.read_table(pa.BufferReader(whole.content))
     assert table["cell"].to_pylist() == [0, 0, 1, 1, 2, 2, 3, 3, 4]
     assert (whole.name, whole.runs, whole.failed, whole.crashed) == ("whole", 9, 4, 2)
