@@ -282,14 +282,18 @@ def test_fleets_that_grew_out_of_one_each_keep_their_own_manoeuvres():
     fleet = SteeredFleet(fleet_of([STRAIGHT] * 3))
     first = fleet
     for at_s in (5.0, 7.0, 9.0):
-        first = first.add_manoeuvres(runs, np.full(3, at_s), [Manoeuvre(0.1 * k, 0.05) for k in (1, 2, 3)])
+        first = first.add_manoeuvres(
+            runs, np.full(3, at_s), [Manoeuvre(0.1 * k, 0.05) for k in (1, 2, 3)]
+        )
 
     def ways(fleet):
         return np.array([fleet[run].at(times).lat_deg for run in runs.tolist()])
 
     before = ways(first)
     both = [
-        first.add_manoeuvres(np.array(who), np.full(len(who), at_s), [Manoeuvre(turn, 0.05)] * len(who))
+        first.add_manoeuvres(
+            np.array(who), np.full(len(who), at_s), [Manoeuvre(turn, 0.05)] * len(who)
+        )
         for who, at_s, turn in (([0, 2], 20.0, 0.5), ([0, 1], 15.0, -0.7))
     ]
     assert np.array_equal(ways(first), before)

@@ -98,7 +98,9 @@ def test_what_was_measured_earlier_is_carried_by_how_the_ownship_moved():
     ):
         one = entry(0.0, 2000.0, 110, 110, after)
         other = entry(azimuth_deg, range_m, 100, 100, before, rate_mps)
-        azimuth, elevation, found_m = extrapolate_entries(one, np.zeros(1, int), other, np.zeros(1, int), 5)
+        azimuth, elevation, found_m = extrapolate_entries(
+            one, np.zeros(1, int), other, np.zeros(1, int), 5
+        )
         np.testing.assert_allclose(
             [np.degrees(azimuth[0]), found_m[0]], wanted, rtol=1e-6, atol=1e-6
         )

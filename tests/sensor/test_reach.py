@@ -161,7 +161,9 @@ def test_decisions_of_rows_are_taken_widened_and_joined_by_hand():
         part = whole.take_rows(some)
         assert part.rows.tolist() == kept and part.reason.tolist() == reasons
         assert part.count == len(np.arange(5)[some])
-    assert whole.reasons_at(whole.rows) is reason and whole.reasons_at(np.array([0, 2, 3])) is reason
+    assert (
+        whole.reasons_at(whole.rows) is reason and whole.reasons_at(np.array([0, 2, 3])) is reason
+    )
     assert whole.reasons_at(np.array([3, 0])).tolist() == [[5, 6], [1, 2]]
     assert whole.reasons_at(np.array([0, 1])) is None
     wide = whole.widen(np.array([3, 1]), 4)
