@@ -53,7 +53,7 @@ def read_conf(path: str | PathLike[str]) -> Configuration:
     keys = AlerterKeys(lines, problems)
     alerters = keys.alerters()
     _check_together(values, lines, problems)
-    problems.raise_all()
+    problems.raise_if_any()
     return Configuration(alerters, values, units, keys.left_out)
 
 

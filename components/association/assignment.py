@@ -42,7 +42,7 @@ def _chi_square_survival(distance: float, size: int) -> float:
     return total
 
 
-def unambiguous_pairs(track: IntArray, detection: IntArray) -> BoolArray:
+def alone(track: IntArray, detection: IntArray) -> BoolArray:
     """Return which pairs are the only one of both their track and their detection."""
     if len(track) == 0:
         return np.zeros(0, dtype=bool)
@@ -76,8 +76,8 @@ def groups(label: IntArray) -> list[IntArray]:
 
 def nearest(track: IntArray, detection: IntArray, distance: FloatArray) -> IntArray:
     """Take the nearest pair, then the nearest of what is left, and so on."""
-    taken = [np.flatnonzero(unambiguous_pairs(track, detection))]
-    left = np.flatnonzero(~unambiguous_pairs(track, detection))
+    taken = [np.flatnonzero(alone(track, detection))]
+    left = np.flatnonzero(~alone(track, detection))
     left = left[np.argsort(distance[left], kind="stable")]
     while len(left):
         # The first pair of its track and of its detection is taken whatever the others are.
@@ -95,7 +95,7 @@ def global_nearest(
     track: IntArray, detection: IntArray, distance: FloatArray, missing: FloatArray | float
 ) -> IntArray:
     """Take the pairs whose sum of distances, with a price for tracks left out, is the least."""
-    single = unambiguous_pairs(track, detection)
+    single = alone(track, detection)
     taken = [np.flatnonzero(single)]
     left = np.flatnonzero(~single)
     price = np.broadcast_to(missing, distance.shape)

@@ -336,7 +336,7 @@ def _find_columns(
                 taken.append(f"{headers[index]} in {unit}")
             factor = unit_factor(problems, spec, unit, line=line, header=headers[index])
         columns[quantity] = SampleColumn(index, headers[index], factor)
-    problems.raise_all()
+    problems.raise_if_any()
     if taken:
         why = f"as {family} writes it" if family else "no unit is given"
         notes.append(f"{', '.join(taken)}: {why}")

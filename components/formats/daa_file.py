@@ -176,7 +176,7 @@ def _find_columns(
                 f"{hint}",
                 line=line,
             )
-    problems.raise_all()
+    problems.raise_if_any()
     for quantity in ("lat", "lon", "alt") if offsets else ("sx", "sy", "sz"):
         indices.pop(quantity, None)
     return indices

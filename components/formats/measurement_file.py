@@ -176,7 +176,7 @@ def _read_table(path: Path, needed: tuple[str, ...], block: str | None) -> _Tabl
             shown = shown_columns(names, not set(names).isdisjoint(LIMITS))
             hint = did_you_mean(name, names)
             table.problems.add(f"there is no column {name!r} among {shown}{hint}")
-    table.problems.raise_all()
+    table.problems.raise_if_any()
     _choose(table, block)
     return table
 
@@ -185,7 +185,7 @@ def _of_csv(table: _Table) -> list[str]:
     def fail(what: str, line: int) -> Exception:
         table.problems.add(what, line=line)
         try:
-            table.problems.raise_all()
+            table.problems.raise_if_any()
         except ValueError as error:
             return error
         raise AssertionError
@@ -296,7 +296,7 @@ def _check(table: _Table) -> None:
     if own and len(own) < len(_OWN):
         missing = ", ".join(name for name in _OWN if name not in numbers)
         table.problems.add(f"the ownship's pose lacks {missing}: all six are needed, or none")
-    table.problems.raise_all()
+    table.problems.raise_if_any()
     if len(time_s) == 0 and table.path.name != "detections.parquet":
         table.problems.fail("there are no rows")
 

@@ -101,7 +101,7 @@ class Recording:
                     f"{name} flies at up to {speed_mps:.3g} m/s from one sample to the next: at "
                     f"most {_FASTEST_MPS:g} m/s can be meant"
                 )
-        self.problems.raise_all()
+        self.problems.raise_if_any()
         self.notes.settle()
         notes = [*self.notes.harmless, *self.notes.warnings]
         return TrafficFile(

@@ -205,7 +205,7 @@ class SampleTable:
             )
         samples = {name: self._sort_by_time(name, *rows) for name, rows in kept.items()}
         self._refuse_long_silence(kept)
-        self._problems.raise_all()
+        self._problems.raise_if_any()
         return {own: samples.pop(own), **samples}
 
     def _without_gaps(self) -> dict[str, tuple[IntArray, dict[str, FloatArray]]]:

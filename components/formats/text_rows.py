@@ -170,7 +170,7 @@ class Problems:
         else:
             self._more += 1
 
-    def raise_all(self) -> None:
+    def raise_if_any(self) -> None:
         """Raise one `TrafficFileError` with all problems so far, in order of their lines."""
         if not self._lines:
             return
@@ -182,7 +182,7 @@ class Problems:
     def fail(self, problem: str, *, line: int | None = None, column: str | None = None) -> NoReturn:
         """Note a problem that makes reading on pointless, and raise."""
         self.add(problem, line=line, column=column)
-        self.raise_all()
+        self.raise_if_any()
         raise AssertionError
 
 

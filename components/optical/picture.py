@@ -55,7 +55,7 @@ class Pinhole:
             )
 
     @classmethod
-    def from_intrinsics(
+    def calibrated(
         cls,
         focal_px: tuple[float, float],
         principal_px: tuple[float, float],

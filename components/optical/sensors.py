@@ -14,7 +14,7 @@ from components.optical.infrared_area import AREA, Plume
 from components.optical.silhouette import union_area
 from components.optical.weather_effects import BandExtinction, Night
 from components.sensor.cued_looks import refuse_cues
-from components.sensor.ladder_values import evaluate_over_cells
+from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look, aspect_angles_of_cells
 from components.sensor.marks import EO, IR
 from components.sensor.parameters import CorrelationTime, ErrorParameters, SensorParameters
@@ -53,7 +53,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
         def values(cells: Cells) -> dict[str, FloatArray]:
             return {_AREA.name: camera.visible_area_m2(cells)}
 
-    return dict(evaluate_over_cells(camera, wake, values))
+    return dict(over_cells(camera, wake, values))
 
 
 def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
@@ -75,7 +75,7 @@ def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray
         error = np.abs(camera.visible_area_m2(cells).astype(np.longdouble) - exact)
         return {_AREA.name: error.astype(np.float64)}
 
-    found = evaluate_over_cells(camera, wake, values)
+    found = over_cells(camera, wake, values)
     return {_AREA.name: found[_AREA.name][cells[:, 0], cells[:, 1]]}
 
 

@@ -41,7 +41,7 @@ def spread_over_roster(targets: RelativeTargets, values: FloatArray) -> FloatArr
     return wide
 
 
-def evaluate_over_cells(
+def over_cells(
     sensor: Sensor,
     wake: Wake,
     values: Callable[[Cells], dict[str, FloatArray]],
@@ -78,7 +78,7 @@ def measure_cells(
 
     def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
         sensor: Any = block
-        given = evaluate_over_cells(
+        given = over_cells(
             sensor, wake, lambda cells: values(sensor, cells), out_of_range=out_of_range
         )
         return dict(given)

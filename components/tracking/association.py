@@ -13,10 +13,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.association.assignment import (
+    alone,
     gate_threshold,
     global_nearest,
     nearest,
-    unambiguous_pairs,
 )
 from components.association.jpda import marginals
 from components.estimation.batched import is_everything, log_determinant, select_tracks
@@ -114,7 +114,7 @@ class Association(Protocol):
 class OneToOne(Association, Protocol):
     """Gives every track at most one detection, and every detection to at most one track."""
 
-    def select_pairs(self, pairs: Candidates) -> IntArray:
+    def taken(self, pairs: Candidates) -> IntArray:
         """Return the pairs that are taken, ascending; no track and no detection is in two."""
         ...
 
@@ -124,10 +124,10 @@ class OneToOne(Association, Protocol):
         hit, gain = np.zeros(len(part), dtype=bool), np.zeros(len(part))
         if not kinds:
             return part, hit, gain
-        if bool(unambiguous_pairs(pairs.track, pairs.detection).all()):
+        if bool(alone(pairs.track, pairs.detection).all()):
             taken = np.arange(len(pairs.track))
         else:
-            taken = self.select_pairs(pairs)
+            taken = self.taken(pairs)
         first = 0
         for one in kinds:
             last = first + len(one.track)
@@ -166,7 +166,7 @@ class OneToOne(Association, Protocol):
 class Nearest(OneToOne):
     """Takes the nearest pair first."""
 
-    def select_pairs(self, pairs: Candidates) -> IntArray:
+    def taken(self, pairs: Candidates) -> IntArray:
         """Return the pairs that are taken."""
         return nearest(pairs.track, pairs.detection, pairs.distance)
 
@@ -174,7 +174,7 @@ class Nearest(OneToOne):
 class GlobalNearest(OneToOne):
     """Takes the pairs of the least sum over all (global nearest neighbour)."""
 
-    def select_pairs(self, pairs: Candidates) -> IntArray:
+    def taken(self, pairs: Candidates) -> IntArray:
         """Return the pairs that are taken."""
         cost = pairs.distance + pairs.volume
         return global_nearest(pairs.track, pairs.detection, cost, pairs.price)

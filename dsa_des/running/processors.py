@@ -229,7 +229,7 @@ class Processor:
             if self._policy.skips(self._working is not None or bool(self._line)):
                 self._note(job, now, SKIPPED)  # another block of this instant was first
                 continue
-            gone: Any = self._policy.jobs_to_drop(tuple(self._line), job)
+            gone: Any = self._policy.dropped(tuple(self._line), job)
             for left in gone:
                 if left is not job:
                     self._line.remove(left)

@@ -27,7 +27,7 @@ class QueuePolicy:
         """
         return False
 
-    def jobs_to_drop(self, waiting: Sequence[Job], new: Job) -> Sequence[Job]:
+    def dropped(self, waiting: Sequence[Job], new: Job) -> Sequence[Job]:
         """Return which jobs go, of those that wait in line (the oldest first) and a new one."""
         return ()
 
@@ -35,7 +35,7 @@ class QueuePolicy:
 class DropOldest(QueuePolicy):
     """Only the newest message waits."""
 
-    def jobs_to_drop(self, waiting: Sequence[Job], new: Job) -> Sequence[Job]:
+    def dropped(self, waiting: Sequence[Job], new: Job) -> Sequence[Job]:
         """Let go of what waits."""
         return waiting
 

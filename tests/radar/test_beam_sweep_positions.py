@@ -62,7 +62,9 @@ def body_azimuths(simulation: Simulation, target: int, times: np.ndarray) -> tup
     traffic = simulation.components["traffic"]
     transform = simulation.components["transform"]
     flights = (traffic.own, traffic.targets[target])
-    seen = transform._columns_at_other_instants(*(flight.at(times[:, np.newaxis]) for flight in flights))
+    seen = transform._columns_at_other_instants(
+        *(flight.at(times[:, np.newaxis]) for flight in flights)
+    )
     return seen["body_azimuth_rad"][:, 0], seen["range_m"][:, 0]
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.aircraft.known_targets import known_targets
-from components.sensor.ladder_values import evaluate_over_cells, measure_cells
+from components.sensor.ladder_values import measure_cells, over_cells
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
@@ -45,7 +45,7 @@ def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatAr
             model[chosen] = number
         return {"snr": radar.snr(cells), "model": model, "pd": _pd_of(radar, cells)}
 
-    at = evaluate_over_cells(radar, wake, values)
+    at = over_cells(radar, wake, values)
     errors = [
         detection_error(
             at["pd"][row, target],

@@ -53,7 +53,7 @@ intruder = [np.interp(frame_s, logged_s, values) for values in logged]
 mounting = np.radians([7.0, -3.0, -12.0])
 
 body = ned_to_body(*line_of_sight_ned(*own, *intruder), *attitude)
-camera = Pinhole.from_intrinsics((1180.0, 1175.0), (1010.0, 540.0), columns=2048, rows=1024)
+camera = Pinhole.calibrated((1180.0, 1175.0), (1010.0, 540.0), columns=2048, rows=1024)
 column, row = camera.pixel(*body_angles(*ned_to_body(*body, *mounting)))
 ```"""
 
