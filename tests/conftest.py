@@ -54,7 +54,8 @@ def hold_problems_to_sentences() -> None:
 
     def checked(self: Problem, source: str, key: str, message: str, *value: Any, **by_name: Any):
         is_sentence = isinstance(message, str) and " " in message
-        assert is_sentence and isinstance(key, str), (source, key, message, *value)
+        by_product = sys._getframe(1).f_globals["__name__"].startswith(("dsa_des.", "components."))
+        assert not by_product or (is_sentence and isinstance(key, str)), (source, key, message)
         made(self, source, key, message, *value, **by_name)
 
     Problem.__init__ = checked  # type: ignore[method-assign]

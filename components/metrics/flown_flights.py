@@ -35,7 +35,7 @@ _SCORES: dict[str, FloatArray] = {
 }
 
 
-class Told(NamedTuple):
+class ManoeuvresTold(NamedTuple):
     """Manoeuvres (n,), in order of coming: when each was told and came, s, who is steered (-1 for
     the ownship), and what it is, (n, fields of `Manoeuvre`).
     """
@@ -45,21 +45,23 @@ class Told(NamedTuple):
     steered: IntArray
     manoeuvre: FloatArray
 
-    def take(self, which: slice | IntArray | BoolArray) -> "Told":
+    def take(self, which: slice | IntArray | BoolArray) -> "ManoeuvresTold":
         """Return some of them."""
-        return Told(
+        return ManoeuvresTold(
             self.told_s[which], self.came_s[which], self.steered[which], self.manoeuvre[which]
         )
 
-    def of(self, platform: int) -> "Told":
+    def of(self, platform: int) -> "ManoeuvresTold":
         """Return those that steer one aircraft."""
         return self.take(self.steered == platform)
 
 
-_NOTHING = Told(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, len(_COLUMNS))))
+_NOTHING = ManoeuvresTold(
+    np.empty(0), np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, len(_COLUMNS)))
+)
 
 
-def flown_as_steered(own: Sequence[Any], told: Sequence[Told]) -> list[SteeredFlight]:
+def flown_as_steered(own: Sequence[Any], told: Sequence[ManoeuvresTold]) -> list[SteeredFlight]:
     """Return what aircraft fly, each steered by at least one manoeuvre."""
     flights = SteeredFleet(fleet_of(own))
     if not told:
@@ -137,7 +139,7 @@ class FlownMetric(TargetMetric):
         """Return those of some blocks that are on the platform that looks."""
         return [block for block in blocks if self._on.get(block, -1) == self.viewer]
 
-    def manoeuvres(self, group: Group) -> Mapping[int, Told]:
+    def manoeuvres(self, group: Group) -> Mapping[int, ManoeuvresTold]:
         """Return the manoeuvres of who looks, of every replica of a group that has any."""
         own = {k: told.of(self.viewer) for k, told in self._received_manoeuvres(group).items()}
         return {k: told for k, told in own.items() if len(told.came_s)}
@@ -146,8 +148,8 @@ class FlownMetric(TargetMetric):
         """Return the replicas in which any aircraft is steered."""
         return np.array(sorted(self._received_manoeuvres(group)), dtype=np.int64)
 
-    def _received_manoeuvres(self, group: Group) -> Mapping[int, Told]:
-        """Return the manoeuvres of every replica that has any; see `Told`.
+    def _received_manoeuvres(self, group: Group) -> Mapping[int, ManoeuvresTold]:
+        """Return the manoeuvres of every replica that has any; see `ManoeuvresTold`.
 
         What is told is known when all before it is.
         """
@@ -161,7 +163,7 @@ class FlownMetric(TargetMetric):
         told_s, replica = np.asarray(table["time_s"], dtype=np.float64), table["replica"]
         given = np.array([table.get(name, nothing) for name in _COLUMNS], dtype=np.float64).T
         came_s = told_s + delay_s[codes]
-        every = Told(told_s, came_s, steered[codes], given)
+        every = ManoeuvresTold(told_s, came_s, steered[codes], given)
         rows = np.flatnonzero(came_s < np.asarray(group.duration_s)[replica])
         rows = rows[np.lexsort((came_s[rows], replica[rows]))]
         result = {}
@@ -285,7 +287,7 @@ def flights_of(
     group: Group,
     step_s: float | None,
     target: str | None,
-    steering: Mapping[int, Told] | None = None,
+    steering: Mapping[int, ManoeuvresTold] | None = None,
     *,
     to_the_end: bool = False,
     some: IntArray | None = None,
@@ -356,7 +358,7 @@ def _aircraft_of(run: Sequence[RelativeFlight]) -> dict[int, Any]:
     }
 
 
-def _limit_to_presence(place: int, flight: Any, told: Told) -> Told:
+def _limit_to_presence(place: int, flight: Any, told: ManoeuvresTold) -> ManoeuvresTold:
     """Return what an aircraft is told while it is there; the ownship always is."""
     if place < 0:
         return told

@@ -9,7 +9,7 @@ from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_o
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.steering import Manoeuvre
-from components.metrics.flown_flights import Told, flown_as_steered
+from components.metrics.flown_flights import ManoeuvresTold, flown_as_steered
 
 STRAIGHT = ScriptedTrajectory(
     "own", lat_deg=52.0, lon_deg=4.0, alt_m=1000.0, heading_deg=90.0, speed_mps=60.0
@@ -164,7 +164,7 @@ def test_a_speed_does_not_become_negative():
 
 def as_told(commands):
     times_s, manoeuvres = map(np.array, zip(*commands, strict=True))
-    return Told(times_s, times_s, np.full(len(times_s), -1), manoeuvres)
+    return ManoeuvresTold(times_s, times_s, np.full(len(times_s), -1), manoeuvres)
 
 
 def test_who_is_told_more_often_than_others_flies_as_if_alone():

@@ -10,6 +10,8 @@ from same_runs import replicas_of, same_as_alone, tables_of
 
 from components.alerting.believed_tracks import BelievedTracks
 from components.alerting.memory import LevelMemory, MemoryRule
+from components.alerting.others_tracks import OthersTracks
+from components.estimation.motion import ConstantVelocity
 from components.messages.detections import Detections
 from components.sensor.declaration import DeclaredPlaces
 from components.tracking.stub import TrackerStub
@@ -79,7 +81,8 @@ def test_places_are_remembered_run_by_run():
 
 def test_a_track_is_named_by_where_the_targets_are_at_that_instant():
     """Two targets change places from one look to the next."""
-    tracks = BelievedTracks(2)
+    others = OthersTracks(frozenset(), 0.9999, ConstantVelocity(4.0), (0.0, 0.0, 0.0))
+    tracks = BelievedTracks(2, others)
     here, there = [0.0, 0.0, 0.0], [500.0, 0.0, 0.0]
     tracks.add_truth(
         RunTicks.of_run(0, np.array([10, 20, 30])),

@@ -149,7 +149,11 @@ def test_a_demand_that_comes_back_around_a_loop_asks_nothing_new():
     """Else each turn of the loop asked for rows one delay earlier, a thousand of them."""
     simulation = Simulation(scene())
     demands = find_demands(simulation.nodes, "traffic")
-    assert [(d.block, d.lead_ticks) for d in demands] == [("exchange", 0), ("exchange_b", 0)]
+    assert [(d.block, d.lead_ticks) for d in demands] == [
+        ("exchange", 0),
+        ("exchange_b", 0),
+        ("over", 0),
+    ]
     assert len(tables_of(scene(duration_s=10))[1]["truth"]) == 2 * 10
 
 

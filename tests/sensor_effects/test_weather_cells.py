@@ -68,7 +68,12 @@ TOWARDS = math.radians(60.0)
 MOVES = MOVES_MPS * math.cos(TOWARDS), MOVES_MPS * math.sin(TOWARDS)
 
 
-@covers("cells", of=("[weather]",))
+@covers(
+    *(f"cells.{key}" for key in ("lat_deg", "lon_deg", "radius_km", "speed_mps", "towards_deg")),
+    "cells",
+    "cells.rain_rate_mm_h",
+    of=("[weather]",),
+)
 def test_a_radar_loses_what_the_chord_through_a_moving_circle_takes():
     dry = by_time(scene({"radar": {**HEARS_ALL, **SLOW}}), "snr_db")
     moving = cell(1700.0, 500.0, speed_mps=MOVES_MPS, towards_deg=60.0)
@@ -93,6 +98,7 @@ def test_a_radar_loses_what_the_chord_through_a_moving_circle_takes():
          {}, RAIN_PER_M),
     ],
 )  # fmt: skip
+@covers("cells.fog_water_g_m3", of=("[weather]",))
 def test_a_camera_loses_contrast_over_the_chord(kind, keys, weather, per_m):
     camera = {**SEES_ALL, **keys, "type": kind, **SLOW}
     high = {"fog_top_m": 9000.0}

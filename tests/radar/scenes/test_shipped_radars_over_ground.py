@@ -34,11 +34,12 @@ def radars(path: Path) -> dict[str, dict[str, Any]]:
 
 
 #: A transponder's replies stand for TCAS: they come on a frequency on which nothing else answers.
+#: The radar of a site stands on the ground, which is not below it.
 RADARS = {
     f"{path.relative_to(CONFIGS)}:{name}": block
     for path in FILES
     for name, block in radars(path).items()
-    if name != "tcas"
+    if name != "tcas" and path.name != "ground_radar.toml"
 }
 
 
