@@ -52,8 +52,7 @@ class Session:
         given = {
             "scene": SCENE, "sets": LATER, "swaps": (), "seed": None, "duration": None,
             "realtime": "1", "out": str(out), "host": "127.0.0.1", "port": 0, "units": "nautical",
-            "no_wait": False,
-            "no_figures": True, **options,
+            "platform": None, "no_wait": False, "no_figures": True, **options,
         }  # fmt: skip
         self.thread = threading.Thread(target=self._run, args=(given,), daemon=True)
         self.thread.start()

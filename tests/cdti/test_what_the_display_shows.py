@@ -146,7 +146,7 @@ def test_bands_are_shown_in_degrees_and_m_until_they_are_old(shown):
 
 def test_what_was_heard_by_an_instant_is_shown_whatever_comes_later(shown):
     scope, _, _ = shown
-    received, before = scope.received(), scope.picture(DURATION_S)
+    received, before = scope.take_received(), scope.picture(DURATION_S)
     late = copy(scope)
     late._contacts, late._alerts, late._bands = None, None, None
     assert late.picture(DURATION_S)["contacts"] == [] != before["contacts"]

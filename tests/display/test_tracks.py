@@ -154,13 +154,13 @@ def test_of_many_aircraft_the_density_is_drawn(tmp_path, monkeypatch, shown, man
     """And of many tracks no spreads, which would cover each other."""
     crowd = copy(shown)
     crowd.tracks = [shown.tracks[0]] * many
-    at, names = shown.targets.at, shown.targets.names
+    at, names = shown.targets.positions_at, shown.targets.names
 
     class Copies:
         def __getattr__(self, name):
             return getattr(shown.targets, name)
 
-        def at(self, time_s):
+        def positions_at(self, time_s):
             rows = at(time_s)
             shift = 20.0 * np.arange(many)[:, np.newaxis, np.newaxis]
             return np.resize(rows[0], (many, *rows.shape[1:])) + shift
@@ -186,15 +186,15 @@ def test_a_target_that_stays_where_it_is_is_a_dot(tmp_path, monkeypatch, shown, 
         def __getattr__(self, name):
             return getattr(shown.targets, name)
 
-        def at(self, time_s):
-            places = shown.targets.at(time_s)
+        def positions_at(self, time_s):
+            places = shown.targets.positions_at(time_s)
             return np.repeat(places[:, :, :1], len(time_s), axis=2) if still else places
 
     drawn.targets = Posts()
     plan = drawn_figure(monkeypatch, draw_tracks, tmp_path / "x.png", drawn).axes[0]
     dots = [one.get_offsets()[0] for one in plan.collections if isinstance(one, PathCollection)]
     if still:
-        places = shown.targets.at(np.array([drawn.time_s[0]]))[:, :, 0]
+        places = shown.targets.positions_at(np.array([drawn.time_s[0]]))[:, :, 0]
         np.testing.assert_allclose(dots, places[:, [1, 0]] / 1e3)
     else:
         assert dots == []
