@@ -261,8 +261,8 @@ def test_an_alert_that_was_rejected_stays_with_its_contact(operated):
         """([target, level]) => {
           window.heard = Link.hears.frame;
           window.frame = { t: 1e4, lag: 0, own: { heading: 0, alt: 900, speed: 50, climb: 0 },
-            area: [], bands: { direction: [], altitude: [], speed: [] }, camera: null, told: true, out: [],
-            contacts: [[target, 900, 900, 0, 45, 0, null, null, null, level]] };
+            area: [], bands: { direction: [], altitude: [], speed: [] }, camera: null, told: true,
+            out: [], contacts: [[target, 900, 900, 0, 45, 0, null, null, null, level]] };
           window.alert_ = { target, level, since: 1e4, at: 1e4, to_loss: 20, closest: 100 };
           window.show = (alerts) => {
             window.heard({ ...window.frame, alerts }); return App.state().alerts; };
