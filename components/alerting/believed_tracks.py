@@ -74,7 +74,7 @@ class EstimatedFlights:
             number=tracks.track,
             from_others=np.zeros(len(run), dtype=bool)
             if self._others is None
-            else self._others.gave(tracks),
+            else self._others.are_of_others_only(tracks),
             time_s=tracks.state_s,
             updated_s=tracks.updated_s,
             state=np.array([getattr(tracks, name) for name in STATE]),

@@ -38,7 +38,7 @@ class OthersTracks:
         motion = ConstantVelocity(intensity_m2_s3)
         return cls(others, probability, motion, navigation_noise(context)[0])
 
-    def gave(self, tracks: StateTracks) -> BoolArray:
+    def are_of_others_only(self, tracks: StateTracks) -> BoolArray:
         """Return which tracks are of other platforms' sensors alone."""
         on_board = sum(1 << i for i, n in enumerate(tracks.sensors) if n not in self.sensors)
         return np.asarray(tracks.contributors & on_board == 0)

@@ -16,7 +16,7 @@ NEVER = "never"
 
 
 def is_in_scan(time: FloatArray | int, scan: FloatArray | int) -> BoolArray:
-    """Return whether a time (NaN for none) is that of the first (last) scan that can tell."""
+    """Return which events lie in the first (or last) scan, which may have cut them off."""
     return np.equal(time, scan)
 
 

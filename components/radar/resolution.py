@@ -112,7 +112,7 @@ class ResolutionParameters(RangeErrorParameters, SensorParameters):
 
     @property
     def sizeless_steps(self) -> list[str]:
-        """Grid steps of 0 that no beamwidth stands for: such a cell has no size."""
+        """Return the names of grid steps that are 0 and have no beamwidth beside them."""
         return [
             step
             for beam, step in CELL_SIZES

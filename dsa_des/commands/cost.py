@@ -202,7 +202,7 @@ def comparison() -> Comparison:
 
 
 def _draw_maps(name: str, out: str | None) -> None:
-    """Draw the maps that the ladders of the types ``NAME.*`` (or of one type) name."""
+    """Draw the error maps of the ladders of one type, or of all types that begin with ``NAME.``."""
     functions = _map_functions()
     if name not in functions:
         raise UsageError(f"--map {name}: no ladder draws such a map{did_you_mean(name, functions)}")

@@ -235,7 +235,7 @@ def _declared_names(cls: type, known: type = BaseModel) -> set[str]:
 
 
 def _is_of_all(function: Any) -> bool:
-    """Whether a validator of fields is the one that all parameters have, of their size."""
+    """Return whether it is the validator of extreme numbers that every `Parameters` has."""
     return getattr(function, "__func__", None) is Parameters._computable.__func__  # type: ignore[attr-defined]
 
 

@@ -23,7 +23,7 @@ from dsa_des.scene.block_table import (
 )
 from dsa_des.scene.graph import unfed_inputs
 from dsa_des.scene.keys import Key, dotted_key
-from dsa_des.scene.overrides import drop_of_other_type
+from dsa_des.scene.overrides import drop_parameters_of_other_type
 from dsa_des.scene.parameter_errors import explain
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.scene.wiring import Wire, block_name_refusal
@@ -307,7 +307,7 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
             scene_file.report((*key, "type"), str(error), str(type_name))
             continue
         classes[name] = cls
-        notes += drop_of_other_type(scene_file, name, cls)
+        notes += drop_parameters_of_other_type(scene_file, name, cls)
         for index, lost in scene_file.replaced.items():
             if index[:2] == key:
                 source, gone = scene_file.source_of(index), ", ".join(lost)

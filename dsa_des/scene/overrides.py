@@ -234,7 +234,7 @@ def swap_type(
     return [f"blocks.{name}.{parameter}" for parameter in dropped]
 
 
-def drop_of_other_type(scene: SceneFile, name: str, cls: type[Component]) -> list[str]:
+def drop_parameters_of_other_type(scene: SceneFile, name: str, cls: type[Component]) -> list[str]:
     """Drop what a block inherited from a table of another type and its own type `cls` lacks.
 
     Return a note on each parameter that was dropped, or is kept and means another thing.
