@@ -256,7 +256,7 @@ class FlownFlights:
         if len(mine) != time_s.size or viewer < 0:
             looking = self._looking(viewer, run, known, time_s)
         else:
-            looking = others.taken(mine).reshaped(time_s.shape)
+            looking = others.taken(mine).reshape(time_s.shape)
         if len(mine):  # the two have changed places
             counts = np.broadcast_to(known[..., 0], shape).reshape(-1)[mine]
             key = runs[mine], times[mine], counts

@@ -51,9 +51,10 @@ def test_a_chunk_beyond_any_cache_makes_each_encounter_once(
     for of in made.values():
         assert set(of) == set(range(RUNS))
         # The first two and the last are looked at when the study is checked, before anything runs,
-        # and the first of a lock step by itself, before those that lie together with it.
-        again = {0, 1, RUNS // 2, RUNS - 1}
-        assert {number for number, many in of.items() if many > 1} <= again
+        # and the first of a lock step by itself, before those that lie together with it
+        # (two or three: what a run records is known from those that ran before).
+        again = {number for number, many in of.items() if many > 1}
+        assert {0, RUNS - 1} <= again and len(again - {0, 1, RUNS - 1}) <= 2
         assert max(of.values()) <= 3
 
 

@@ -7,6 +7,7 @@ import subprocess
 import tempfile
 import time
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -224,9 +225,10 @@ def test_one_clear_error_and_nothing_left(lab, lag, fault, said, monkeypatch):
     folder.mkdir()  # others run beside it
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     if fault == 2:  # by this clock the deadline is over once it hangs, however fast the machine is
+        looks = count()
 
-        def late():
-            return clock() + 100.0 * _is_past_first_points(folder)
+        def late():  # 200 s from each look to the next
+            return clock() + 200.0 * (next(looks) if _is_past_first_points(folder) else 0)
 
         monkeypatch.setattr(time, "monotonic", late)
     before = _left_behind()
