@@ -1,10 +1,12 @@
 """The published campaign: counts of several folders, and whose interval holds whose."""
 
-import pandas as pd
+import pytest
 from click.testing import CliRunner
 
 from docs.make.platforms.campaign import counted, rows
 from dsa_des.cli import main
+
+pd = pytest.importorskip("pandas")
 
 
 def test_runs_of_a_cell_count_together_and_are_held_against_the_published_ones():

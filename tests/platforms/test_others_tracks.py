@@ -1,7 +1,6 @@
 """Tracks that one platform sends to another: their frame, their sureness, and whose they are."""
 
 import numpy as np
-import pandas as pd
 import pyarrow.compute as pc
 import pymap3d
 import pytest
@@ -14,7 +13,6 @@ from components.alerting.others_tracks import OthersTracks
 from components.estimation.motion import ConstantVelocity
 from components.messages.columns import ORIGIN
 from components.messages.state_tracks import COVARIANCE
-from docs.make.platforms.link_latency import rows
 from dsa_des import SceneError
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.cli import main
@@ -284,12 +282,15 @@ def test_the_likeliest_mistakes_are_said(path, mistake, said):
 
 def test_an_alert_of_who_turns_in_is_later_by_the_link_s_latency(tmp_path):
     """At 55 m/s the two come 110 m nearer in 2 s; to a steady flight latency is nothing."""
+    pandas = pytest.importorskip("pandas")
+    from docs.make.platforms.link_latency import rows
+
     call = ["study", "link_latency", "--set", "replicas=8", "--workers", "1", "--quiet"]
     done = CliRunner().invoke(main, [*call, "--out", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
     cells = [
         line.strip("| ").split(" | ")
-        for line in rows([pd.read_parquet(tmp_path / "out" / "parts")])[2:]
+        for line in rows([pandas.read_parquet(tmp_path / "out" / "parts")])[2:]
     ]
     nearer = {(float(c[0]), c[1]): [float(c[k].split()[0]) for k in (3, 5)] for c in cells}
     assert nearer[0.0, "0 %"] == [0.0, 0.0]
