@@ -73,7 +73,7 @@ class LivePacer(Pacer):
 
     def start(self) -> None:
         """Let simulated time 0 be when nothing holds the run any more."""
-        self._hold()
+        self._wait_while_held()
         super().start()
 
     def __call__(self, time_s: float) -> None:
@@ -88,9 +88,9 @@ class LivePacer(Pacer):
         self.max_lag_s = max(self.max_lag_s, lag_s)
         self.total_lag_s += lag_s
         self._came_to(time_s, lag_s)
-        self._hold()
+        self._wait_while_held()
 
-    def _hold(self) -> None:
+    def _wait_while_held(self) -> None:
         """Wait while the run is held; its clock stands still meanwhile."""
         began = self.now()
         while not self.stopped and self._holds():

@@ -130,7 +130,7 @@ class DisplayServer:
 
     def tell(self, content: dict[str, Any]) -> None:
         """Tell every page."""
-        self._call_from_outside(lambda: self._tell_all(content))
+        self._call_from_outside(lambda: self._send_to_all(content))
 
     def close(self, last: dict[str, Any]) -> None:
         """Say a last word to every page and end."""
@@ -138,7 +138,7 @@ class DisplayServer:
             return
 
         async def leave() -> None:
-            await self._tell_all(last)
+            await self._send_to_all(last)
             self._stop.set()
 
         self._call_from_outside(leave)
@@ -236,7 +236,7 @@ class DisplayServer:
             await page.send(
                 {"type": "welcome", "role": role, "key": key, **self._control.welcome(role)}
             )
-            feeding = asyncio.create_task(self._feed(page))
+            feeding = asyncio.create_task(self._send_pictures(page))
             async for text in connection:
                 await self._receive(page, text)
         except ConnectionClosed:
@@ -261,7 +261,7 @@ class DisplayServer:
         else:
             await self._control.on_message(page, message)
 
-    async def _feed(self, page: Page) -> None:
+    async def _send_pictures(self, page: Page) -> None:
         """Send a page the newest picture whenever it can take one."""
         seen = 0
         with suppress(ConnectionClosed):
@@ -280,7 +280,7 @@ class DisplayServer:
             self._number += 1
             self._new.notify_all()
 
-    async def _tell_all(self, content: dict[str, Any]) -> None:
+    async def _send_to_all(self, content: dict[str, Any]) -> None:
         waits = [asyncio.create_task(page.send(content)) for page in self.pages]
         if waits:
             await asyncio.wait(waits, timeout=1.0)
@@ -301,7 +301,7 @@ class ConnectionLimit:
     def take(self) -> bool:
         """Count a connection that opens; return False where there is no room for it."""
         if self._open >= self._most:
-            self._tell(f"more than {self._most} connections")
+            self._warn_once(f"more than {self._most} connections")
             return False
         self._open += 1
         return True
@@ -315,14 +315,14 @@ class ConnectionLimit:
         error = context.get("exception")
         if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
             self._starved = True
-            self._tell("more connections than files may be open")
+            self._warn_once("more connections than files may be open")
         elif self._starved and isinstance(error, ValueError) and "descriptor: -1" in str(error):
             # A second later the loop listens again, to a socket that the end has closed meanwhile.
             pass
         else:
             loop.default_exception_handler(context)
 
-    def _tell(self, what: str) -> None:
+    def _warn_once(self, what: str) -> None:
         if not self._said:
             self._said = True
             self._say(f"the display was sent {what}: some are dropped, the session goes on")

@@ -77,7 +77,7 @@ class RecordedTables:
                 f"{self.folder}: --platform {platform!r}: nothing of this run is carried by it"
                 f"{did_you_mean(platform, names)}"
             )
-        return replace(self, tables={n: _on(n, t, platform, names[0]) for n, t in
+        return replace(self, tables={n: _rows_on_platform(n, t, platform, names[0]) for n, t in
                                      self.tables.items()}, _kept={})  # fmt: skip
 
     @cached_property
@@ -181,7 +181,7 @@ def _pairs(table: Any) -> set[tuple[str, str | None]]:
     return {(row["block"], row["platform"]) for row in rows.to_pylist()}
 
 
-def _on(name: str, table: Any, platform: str, first: str) -> Any:
+def _rows_on_platform(name: str, table: Any, platform: str, first: str) -> Any:
     """Return a table's rows of blocks on a platform; of the truth all, as seen from it."""
     import pyarrow as pa
     import pyarrow.compute as pc

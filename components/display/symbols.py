@@ -102,11 +102,11 @@ def block_marks(types: Mapping[str, str]) -> dict[str, Mark]:
         if kind is not None:
             again = before.get(kind, 0)
             before[kind] = again + 1
-            result[name] = replace(result[name], colour=_shade(kind.colour, again))
+            result[name] = replace(result[name], colour=_shade_colour(kind.colour, again))
     return result
 
 
-def _shade(colour: str, again: int) -> str:
+def _shade_colour(colour: str, again: int) -> str:
     parts = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
     share = _SHADES[again % len(_SHADES)] * (1 if _luminance(parts) < _LIGHT else -1)
     towards = 255 if share > 0 else 0

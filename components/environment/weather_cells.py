@@ -62,7 +62,7 @@ class WeatherCell(Parameters):
     )
 
     @model_validator(mode="after")
-    def _something_in_it(self) -> Self:
+    def _check_not_empty(self) -> Self:
         if not (self.rain_rate_mm_h or self.fog_water_g_m3):
             raise ValueError("a cell has rain_rate_mm_h, fog_water_g_m3 or both")
         return self

@@ -98,7 +98,7 @@ def choose(
     )
     refused: dict[str, str] = {}
     for earth, attitude in pairs:
-        bound = _worst([error_bound(earth, envelope, attitude) for envelope in envelopes])
+        bound = _largest_bounds([error_bound(earth, envelope, attitude) for envelope in envelopes])
         complaint = allowed.complaint(bound)
         if not complaint:
             break
@@ -106,11 +106,11 @@ def choose(
         refused[earth] = f"{name_of(earth, attitude)}: {complaint}"
     else:
         earth, attitude = max(earths, key=EARTH_MODELS.index), min(attitudes)
-        bound = _worst([error_bound(earth, envelope, attitude) for envelope in envelopes])
+        bound = _largest_bounds([error_bound(earth, envelope, attitude) for envelope in envelopes])
     return ModelChoice(earth, attitude, bound, tuple(refused.values()))
 
 
-def _worst(bounds: Sequence[ErrorBound]) -> ErrorBound:
+def _largest_bounds(bounds: Sequence[ErrorBound]) -> ErrorBound:
     columns = [astuple(bound) for bound in bounds] or [(0.0,) * len(fields(ErrorBound))]
     return ErrorBound(*map(max, zip(*columns, strict=True)))
 

@@ -191,7 +191,7 @@ class Tracking(PlatformTracks):
         key = _keys(columns)
         first, confirmed_row = np.unique(key[rows[kept[rows]]], return_index=True)
         confirmed_s = columns["time_s"][rows[kept[rows]][confirmed_row]]
-        instant, row = _standing(columns, rows, grid)
+        instant, row = _valid_rows(columns, rows, grid)
         instant, row = instant[kept[row]], row[kept[row]]
         order = np.lexsort((row, instant))
         instant, row = instant[order], row[order]
@@ -241,7 +241,7 @@ def _keys(columns: Any) -> IntArray:
     return columns["block"].codes * (track.max(initial=0) + 1) + track
 
 
-def _standing(columns: Any, rows: IntArray, grid: FloatArray) -> tuple[IntArray, IntArray]:
+def _valid_rows(columns: Any, rows: IntArray, grid: FloatArray) -> tuple[IntArray, IntArray]:
     """Return grid instants (indices) and the rows valid at them, block by block.
 
     A report stands from its own instant until its block's next one. A block reports all of its

@@ -113,7 +113,9 @@ FLUCTUATION = Hook("RCS", ModelsOfCells, "which Swerling model each cell has")
 MEAN_RCS = Hook("mean RCS", CellValues, "each cell's mean RCS in m²")
 
 
-def _by_targets(context: Context, says: Callable[[Aircraft], str], *, otherwise: str) -> Verdict:
+def _verdict_by_targets(
+    context: Context, says: Callable[[Aircraft], str], *, otherwise: str
+) -> Verdict:
     """Return the verdict on an effect that targets call for by what one `says` they have."""
     rosters = known_targets(context)
     if not rosters:
@@ -140,7 +142,7 @@ class RcsFluctuation(Effect[ModelsOfCells]):
         """Ask the radar's ``swerling``, and where it has none each target's."""
         if block.p.swerling is not None:
             return Verdict(block.p.swerling not in (0, 5), f"swerling is {block.p.swerling}")
-        return _by_targets(
+        return _verdict_by_targets(
             block.context,
             lambda craft: f"swerling {craft.swerling}" if craft.swerling % 5 else "",
             otherwise="every target has swerling 0 or 5",
@@ -161,7 +163,7 @@ class AspectRcs(Effect[CellValues]):
         """Ask for ``aspect_rcs``, and every target for an ``rcs_table``."""
         if not block.p.aspect_rcs:
             return Verdict(False, "aspect_rcs is false")
-        return _by_targets(
+        return _verdict_by_targets(
             block.context,
             lambda craft: "an rcs_table" if craft.rcs_table else "",
             otherwise="no target has an rcs_table",

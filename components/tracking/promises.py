@@ -180,14 +180,14 @@ class Silence:
         run, since = at.run[order], worked.copy()
         again = run[1:] == run[:-1]
         since[order[1:][again]] = at.tick[order[:-1][again]]
-        return self._first(at.run, since), last_of_run(self.silent, at)
+        return self._first_silent(at.run, since), last_of_run(self.silent, at)
 
     def from_last_work(self, run: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
         """Return the silent rows of some runs from their last work on."""
         ends = next_of_run(self.silent, RunTicks(run + 1, np.zeros_like(run)))
-        return self._first(run, worked), ends - 1
+        return self._first_silent(run, worked), ends - 1
 
-    def _first(self, run: IntArray, worked: IntArray) -> IntArray:
+    def _first_silent(self, run: IntArray, worked: IntArray) -> IntArray:
         return next_of_run(self.silent, RunTicks(run, worked + self.ticks_per_s))
 
     def end_silent_tracks(

@@ -239,7 +239,7 @@ class TrackerParameters(Parameters):
     )
 
     @model_validator(mode="after")
-    def _possible(self) -> Any:
+    def _check_confirmation(self) -> Any:
         if self.confirm_m > self.confirm_n:
             raise ValueError(
                 f"confirm_m = {self.confirm_m} hits cannot fall in confirm_n = {self.confirm_n} "

@@ -235,7 +235,7 @@ class TrafficSource(Component):
             return None
         # A flight into the ground is said of its own replica, by itself.
         for number in range(len(parameters)):
-            self._check_terrain(partial(_one_of, flights.own, number))
+            self._check_terrain(partial(_states_of_one, flights.own, number))
         of_all = copy(self)
         flown = FlownFlights.of(flights.own, flights.targets, [*self._flown.platforms])
         of_all._fly(flown, flights.roster, parameters)
@@ -390,6 +390,6 @@ class TrafficSource(Component):
         return [*self.sample_times(), *grid]
 
 
-def _one_of(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
+def _states_of_one(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
     """Return the states of one flight of many at times (n,)."""
     return fleet.each(np.full(len(time_s), aircraft), time_s)

@@ -140,7 +140,7 @@ class Seen:
 
     def by_ownship(self, there: BoolArray) -> tuple[BoolArray, IntArray | None]:
         """Return which targets are present for the ownship, and how many are left out."""
-        return self._present(-1, there, self.own.present)
+        return self._present_for(-1, there, self.own.present)
 
     def by_others(
         self, there: BoolArray, names: Sequence[str]
@@ -151,10 +151,10 @@ class Seen:
             place = int(np.searchsorted(self.columns, view.viewer))
             changed = there.copy()
             changed[:, place] = self.own.present
-            result[names[view.viewer]] = self._present(view.viewer, changed, there[:, place])
+            result[names[view.viewer]] = self._present_for(view.viewer, changed, there[:, place])
         return result
 
-    def _present(
+    def _present_for(
         self, viewer: int, there: BoolArray, looking: BoolArray
     ) -> tuple[BoolArray, IntArray | None]:
         _, columns, near = self._near[viewer]

@@ -163,7 +163,11 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[Label]:
         error, label = cost.error.p95, cost.rung + (" (scene)" if cost.in_scene else "")
         on_floor = not error > floor
         if on_floor:
-            label += ": error unknown" if math.isnan(error) else f": {_tiny(error)} {quantity.unit}"
+            label += (
+                ": error unknown"
+                if math.isnan(error)
+                else f": {_error_text(error)} {quantity.unit}"
+            )
         at = (cost.cpu_us_per_target_scan, floor if on_floor else error)
         colour = RED if cost.pareto else "#777777"
         axes.errorbar(
@@ -176,8 +180,8 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[Label]:
     axes.plot(*zip(*front, strict=True), color=RED, linewidth=1, zorder=2)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlim(*_wide([x for (x, _), _ in points], right=1.2))
-    axes.set_ylim(*_wide([y for (_, y), _ in points]))
+    axes.set_xlim(*_log_limits([x for (x, _), _ in points], right=1.2))
+    axes.set_ylim(*_log_limits([y for (_, y), _ in points]))
     axes.grid(True, which="major", color="#dddddd", linewidth=0.6)
     axes.set_title(
         f"{figure_text(first.block)}: {first.ladder.name}, against {first.reference}", fontsize=9
@@ -191,7 +195,7 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[Label]:
     return labels
 
 
-def _tiny(error: float) -> str:
+def _error_text(error: float) -> str:
     return f"{error:.0e}" if error else "0"
 
 
@@ -233,7 +237,7 @@ def put_labels(axes: Any, labels: Sequence[Label]) -> None:
         )  # fmt: skip
 
 
-def _wide(values: Sequence[float], right: float = 0.4) -> tuple[float, float]:
+def _log_limits(values: Sequence[float], right: float = 0.4) -> tuple[float, float]:
     """Return limits of a log axis: some room on both sides, whole decades inside."""
     low, high = math.log10(min(values)), math.log10(max(values))
     return 10.0 ** (math.floor(low) - 0.2), 10.0 ** max(high + right, math.floor(low) + 1.2)

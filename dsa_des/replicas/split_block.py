@@ -50,7 +50,7 @@ class SplitBlock:
         """Let every replica's instance handle its rows."""
         firsts = wake.instants.first_of_each.tolist()
         sent: dict[str, list[Message]] = {}
-        self._let_go(wake.first_run)
+        self._finish_ended_runs(wake.first_run)
         self._keep_waiting(wake)
         for first, end in zip(firsts, [*firsts[1:], len(wake)], strict=True):
             number = int(wake.run[first])
@@ -84,11 +84,11 @@ class SplitBlock:
 
         `NotInLockStep` if one of these would have told its neighbours something else.
         """
-        self._let_go(None)
+        self._finish_ended_runs(None)
         for number in sorted(set(range(replicas)) - self._made):
             self._finished(number, self.make(number))
 
-    def _let_go(self, before: int | None) -> None:
+    def _finish_ended_runs(self, before: int | None) -> None:
         for number in sorted(self._instances):
             if before is None or number < before:
                 self._finished(number, self._instances.pop(number))

@@ -47,7 +47,7 @@ def draw_heat(
         for items, put in ((columns, axes.set_xticks), (rows, axes.set_yticks)):
             step = max(1, len(items) // 16)
             shown = range(0, len(items), step)
-            put(list(shown), [_short(items[k]) for k in shown])
+            put(list(shown), [_short_text(items[k]) for k in shown])
         if values.size <= 150:
             middle = np.nanmean(values) if (many > 0).any() else 0.0
             for (r, c), value in np.ndenumerate(values):
@@ -61,7 +61,7 @@ def draw_heat(
         tight(figure)
 
 
-def _short(value: Any) -> str:
+def _short_text(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else figure_text(value)
 
 
@@ -104,8 +104,8 @@ def draw_map(
                 vmin=least, vmax=most, shading="nearest",
             )  # fmt: skip
             _contours(axes, parts, limits)
-            axes.set_xticks(range(len(columns)), [_short(v) for v in columns])
-            axes.set_yticks(range(len(rows)), [_short(v) for v in rows])
+            axes.set_xticks(range(len(columns)), [_short_text(v) for v in columns])
+            axes.set_yticks(range(len(rows)), [_short_text(v) for v in rows])
             names = [value_label(axes_of[k], v) for k, v in zip(others, at, strict=True)]
             axes.set_title("\n".join(names), loc="left", fontsize=8)
         for empty in range(len(panels), wide * tall):

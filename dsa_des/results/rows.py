@@ -171,8 +171,8 @@ class Rows:
         self.axes = [name for name in axes if name not in over]
         self.over = list(over)
         #: What rows share that belong to the same place, and to the same independent unit.
-        self.places = self._codes(self.axes)
-        self.units = self._codes(self.over if self.over else ["replica"])
+        self.places = self._code_rows(self.axes)
+        self.units = self._code_rows(self.over if self.over else ["replica"])
 
     @cached_property
     def runs(self) -> IntArray:
@@ -210,7 +210,7 @@ class Rows:
         """Return a row as column → value."""
         return {name: _plain(self.column(name)[number]) for name in self.stored.names}
 
-    def _codes(self, names: Sequence[str]) -> IntArray:
+    def _code_rows(self, names: Sequence[str]) -> IntArray:
         codes = np.zeros(len(self.stored), dtype=np.int64)
         for name in names:
             _, code = np.unique(self.column(name), return_inverse=True)

@@ -42,7 +42,7 @@ class Tables:
         self.rows = Rows(StoredRows(folder), axes, record.sample_columns)
         self.lines: list[Line] = summarise(
             self.rows, self.results, record.confidence, record.interval,
-            self._earlier() if expected is None else expected,
+            self._analytic_answers() if expected is None else expected,
         )  # fmt: skip
         #: Of each requirement, at every combination of the other axes' values.
         self.answers: list[Answer] = [
@@ -62,7 +62,7 @@ class Tables:
                 record.compare_weight,
             )  # fmt: skip
 
-    def _earlier(self) -> dict[tuple[str, tuple[Any, ...]], float]:
+    def _analytic_answers(self) -> dict[tuple[str, tuple[Any, ...]], float]:
         """Return the analytic answers that the folder's summary holds."""
         table = self.folder.table(SUMMARY)
         if table is None or not {*self.rows.axes, "result", "expected"} <= set(table.column_names):

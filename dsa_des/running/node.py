@@ -244,7 +244,7 @@ class Node:
             for wire in self._trigger_wires:
                 wire.collect(tick + 1)  # what came to be worked on now is left out with it
             return
-        self._run(_now(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
+        self._run(_instant_of(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
 
     def _run_window(self, start: int, end: int) -> None:
         if self.clock is not None:
@@ -337,7 +337,7 @@ class Node:
         self._missed = False
         tick = int(self.simulation.env.now)
         scans = np.array([-1], dtype=np.int64)
-        wake = self._inputs.wake_at(_now(tick), scans, tick + 1, complete=False)
+        wake = self._inputs.wake_at(_instant_of(tick), scans, tick + 1, complete=False)
         assert wake is not None
         return wake
 
@@ -395,5 +395,5 @@ def _no_scan_numbers(rows: int) -> IntArray:
     return _NO_SCAN[:rows]
 
 
-def _now(tick: int) -> RunTicks:
+def _instant_of(tick: int) -> RunTicks:
     return RunTicks(runs_of_single(1), np.array([tick], dtype=np.int64))

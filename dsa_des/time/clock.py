@@ -42,7 +42,7 @@ def parse_rational(value: object) -> Fraction:
         if not math.isfinite(value):
             raise ValueError("must be finite")
         value = repr(float(value))
-    elif isinstance(value, str) and _too_long(value):
+    elif isinstance(value, str) and _has_too_many_digits(value):
         raise ValueError(_TOO_LONG)
     try:
         number = Fraction(value)
@@ -56,7 +56,7 @@ def parse_rational(value: object) -> Fraction:
 _TOO_LONG = f"must be a number that is a fraction of whole numbers of at most {_MOST_DIGITS} digits"
 
 
-def _too_long(text: str) -> bool:
+def _has_too_many_digits(text: str) -> bool:
     """Tell, without expanding it, whether a text stands for a number of too many digits."""
     exponent = _EXPONENT.search(text[-_LONGEST_TEXT:])
     return len(text) > _LONGEST_TEXT or (

@@ -224,7 +224,7 @@ class Instance:
 
     # -- clocks --------------------------------------------------------------------------------
 
-    def _go(self, before: int, tick: int, per_s: int, raised: Any) -> bool:
+    def _step_to(self, before: int, tick: int, per_s: int, raised: Any) -> bool:
         """Step to an instant; clocks that tick on the way do so at their own; whether it got there.
 
         Those that tick at the instant itself are left to whoever gives it its inputs there.
@@ -305,7 +305,7 @@ class Instance:
                     self._events(None, due_now, raised[row])
                     self._leave_event_mode(tick, per_s)
             elif clocked:
-                if not self._go(self.tick, tick, per_s, raised[row]):
+                if not self._step_to(self.tick, tick, per_s, raised[row]):
                     done = row
                     break
                 now_due = [*due[row], *self.clocks.ticking(tick - 1, tick)]
