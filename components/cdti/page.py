@@ -69,7 +69,7 @@ class Admission:
         self._watching = [self.token]
         self._key = ""
 
-    def knows(self, token: str) -> bool:
+    def is_token(self, token: str) -> bool:
         """Return whether a token is one of this run, used up or not."""
         return any(_is_same_word(token, known) for known in self._watching)
 

@@ -124,7 +124,7 @@ class DisplayServer:
         """Return the address of the page."""
         return f"http://{self.authority}/?token={token}"
 
-    def show(self) -> None:
+    def announce_picture(self) -> None:
         """Let every page have a new picture when it can take one."""
         self._call_from_outside(self._announce)
 
@@ -196,7 +196,7 @@ class DisplayServer:
         hosts = request.headers.get_all("Host")
         if hosts != [self.authority]:  # another name for this address: a page of somewhere else
             return connection.respond(403, "not this host\n")
-        if not self._admission.knows(_token(request)):
+        if not self._admission.is_token(_token(request)):
             return connection.respond(
                 403, "the address lacks its token, or it is not of this run\n"
             )
@@ -298,7 +298,7 @@ class ConnectionLimit:
         """Return what `websockets.asyncio.server.serve` makes of a new connection."""
         return _Limited(self, *given, **options)
 
-    def take(self) -> bool:
+    def count_opened(self) -> bool:
         """Count a connection that opens; return False where there is no room for it."""
         if self._open >= self._most:
             self._warn_once(f"more than {self._most} connections")
@@ -306,7 +306,7 @@ class ConnectionLimit:
         self._open += 1
         return True
 
-    def give_back(self) -> None:
+    def count_closed(self) -> None:
         """Count a connection that was taken and is gone."""
         self._open -= 1
 
@@ -337,7 +337,7 @@ class _Limited(ServerConnection):
 
     def connection_made(self, transport: Any) -> None:
         """Take it, or drop it."""
-        self._taken = self._limit.take()
+        self._taken = self._limit.count_opened()
         if self._taken:
             super().connection_made(transport)
         else:
@@ -347,7 +347,7 @@ class _Limited(ServerConnection):
         """Give its place back."""
         if self._taken:
             self._taken = False
-            self._limit.give_back()
+            self._limit.count_closed()
             super().connection_lost(error)
 
 

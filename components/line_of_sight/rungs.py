@@ -50,7 +50,7 @@ class Allowance:
     # What sensors downstream bear (see `components.messages.reach.Reach`)
     relative_range: float = math.inf
 
-    def complaint(self, bound: ErrorBound) -> str:
+    def describe_excess(self, bound: ErrorBound) -> str:
         """Say which bound is not allowed, or nothing."""
         if bound.angle_rad > self.angle_rad:
             return (
@@ -99,7 +99,7 @@ def choose(
     refused: dict[str, str] = {}
     for earth, attitude in pairs:
         bound = _largest_bounds([error_bound(earth, envelope, attitude) for envelope in envelopes])
-        complaint = allowed.complaint(bound)
+        complaint = allowed.describe_excess(bound)
         if not complaint:
             break
         # The exact attitude comes later: what it does not cure is the Earth's fault.

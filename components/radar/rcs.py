@@ -13,8 +13,8 @@ from components.aircraft.aircraft import Aircraft
 from components.aircraft.known_targets import known_targets
 from components.arguments.checks import (
     broadcast_flat,
-    check_model,
     check_not_negative,
+    check_swerling_model,
     finite,
     refuse,
     unflatten,
@@ -36,7 +36,7 @@ def fluctuating_rcs(mean_rcs_m2: ArrayLike, uniforms: ArrayLike, model: str) -> 
     Larger draws give larger RCS. Thesis eq. 22 with N = 1 (eq. 23: the exponential in power,
     Rayleigh in amplitude) and N = 2.
     """
-    name = check_model(model)
+    name = check_swerling_model(model)
     mean, draw = check_not_negative("mean_rcs_m2", mean_rcs_m2), finite("uniforms", uniforms)
     refuse("uniforms", draw, ~((draw >= 0.0) & (draw < 1.0)), "lie in [0, 1)")
     if name in ("swerling2", "swerling4"):
@@ -68,7 +68,7 @@ def scan_rcs(
     each pulse the sum of n pulses depends only on the sum of their SNR. So a steady target's Pd at
     the scan's RCS, averaged over scans, is the model's own Pd, whatever the pulses.
     """
-    name = check_model(model)
+    name = check_swerling_model(model)
     if name == "swerling0":
         return np.array(mean_rcs_m2)
     if name in ("swerling1", "swerling3"):

@@ -275,8 +275,8 @@ class TrafficSource(Component):
         flown = self._flown
         seen = Seen(self._views, flown, run, time_s)
         states = self._targets_at(run, seen.columns, time_s)
-        present, culled = seen.by_ownship(states.present)
-        others = seen.by_others(states.present, self.roster.names)
+        present, culled = seen.present_for_ownship(states.present)
+        others = seen.present_for_others(states.present, self.roster.names)
         truth = replace(flown, intervals={}, rates_hz=None, unseen=()) if self.says_truth else None
         asked = any(look.lasts_s > 0.0 for look in self._looks.values())
         return TrafficStates.of(

@@ -138,11 +138,11 @@ class Seen:
             viewers = np.array([view.viewer for view in views[1:]])
             self.columns = np.unique(np.concatenate([columns, viewers, *others]))
 
-    def by_ownship(self, there: BoolArray) -> tuple[BoolArray, IntArray | None]:
+    def present_for_ownship(self, there: BoolArray) -> tuple[BoolArray, IntArray | None]:
         """Return which targets are present for the ownship, and how many are left out."""
         return self._present_for(-1, there, self.own.present)
 
-    def by_others(
+    def present_for_others(
         self, there: BoolArray, names: Sequence[str]
     ) -> Mapping[str, tuple[BoolArray, IntArray | None]]:
         """Return the same for the other platforms, by name, with the ownship in their places."""

@@ -14,9 +14,9 @@ from dsa_des.answers.turns import Batch, TurnTimes, run_in_turns, turns_of
 from dsa_des.answers.verdicts import BEYOND, NOTHING, OPEN, Limit, parse_limits
 from dsa_des.commands.cost import CostProgress
 from dsa_des.commands.study import (
-    begun_or_empty,
     check_workers,
     options_as_sets,
+    require_empty_or_resumed,
     result_names,
     stop_with,
     target_of,
@@ -86,7 +86,7 @@ def cost_at_the_answer(
     described.repeat = command_of(["cost", *words], sets, described.path)
     answer = AnswerOfStudy(described, answers, block, listed, budgets, repeats)
     target = target_of(Path("runs"), f"{path.stem}-cost", out, resume)
-    begun_or_empty(target, resume, "what was begun there")
+    require_empty_or_resumed(target, resume, "what was begun there")
     folder = target if isinstance(target, Path) else target()
     words += [*_as_options("workers", [str(workers)] if workers else []), "--out", str(folder)]
     words += ["--no-figures"] * no_figures + ["--json"] * as_json + _as_options("set", sets)
@@ -226,7 +226,7 @@ class AnswerOfStudy:
 
     def _resume_turns(self, path: Path) -> int:
         """Return how many turns an earlier attempt finished, in as many turns as it was to have."""
-        kept = self.turn_times.take_up(path)
+        kept = self.turn_times.read_earlier(path)
         if kept is None:
             return 0
         done, turns = kept

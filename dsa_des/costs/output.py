@@ -11,7 +11,7 @@ from typing import Any
 from dsa_des.block.mark import RED
 from dsa_des.costs.climb import Comparison, RungCost, show_number
 from dsa_des.files.output_file import write_file
-from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
+from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts, plain_log_ticks
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
 from dsa_des.text.safe_text import shorten
@@ -137,7 +137,7 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
         for number, rungs in enumerate(panels):
             axes = figure.add_subplot(rows, columns, number + 1)
             drawn.append((axes, _draw_panel(axes, rungs)))
-        tight(figure)
+        fit_axes_to_texts(figure)
         for axes, labels in drawn:  # where points are is known only now
             put_labels(axes, labels)
 

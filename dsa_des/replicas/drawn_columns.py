@@ -81,7 +81,7 @@ class ReplicaScenes(Sequence[Scene]):
             return [self._scene.blocks[block].parameters] * len(self)
         return [self._parameters_of(block, number) for number in range(len(self))]
 
-    def differing(self, block: str) -> set[str]:
+    def differing_parameters(self, block: str) -> set[str]:
         """Return which of a block's parameters are not the same in all replicas."""
         return {
             str(column.path[0])

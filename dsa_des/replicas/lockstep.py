@@ -110,7 +110,7 @@ class Replicas(Timeline):
     def _differing_parameters(self, name: str) -> set[str]:
         """Return which of a block's parameters are not the same in all replicas."""
         if isinstance(self._scenes, ReplicaScenes):
-            return self._scenes.differing(name)
+            return self._scenes.differing_parameters(name)
         first = self._scenes[0].blocks[name].parameters
         names, fields, values = set[str](), type(first).model_fields, vars(first)
         for scene in self._scenes[1:]:

@@ -15,7 +15,7 @@ from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import STATIC, Message
-from dsa_des.block.wake import Arrivals, Wake, by_output
+from dsa_des.block.wake import Arrivals, Wake, messages_by_output
 from dsa_des.errors import RunRefused
 
 
@@ -64,7 +64,7 @@ class SplitBlock:
                     port: _append_arrivals(waiting, part.arrivals(port)),
                 }
             result = self._instances[number].run(part)
-            for port, message in by_output(result, self._outputs).items():
+            for port, message in messages_by_output(result, self._outputs).items():
                 run = np.full(len(message), number, dtype=np.int64)
                 sent.setdefault(port, []).append(message.of_runs(run))
         return {port: _concatenate(parts) for port, parts in sent.items()} or None

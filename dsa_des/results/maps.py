@@ -9,7 +9,7 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import RED
-from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts
 from dsa_des.results.labels import axis_label, readable, value_label
 from dsa_des.results.summary import Line
 
@@ -58,7 +58,7 @@ def draw_heat(
         axes.set_ylabel(axis_label(y))
         axes.set_title(textwrap.fill(figure_text(title, _TITLE), 44), loc="left")
         figure.colorbar(image, label=readable(metric))
-        tight(figure)
+        fit_axes_to_texts(figure)
 
 
 def _short_text(value: Any) -> str:
@@ -122,7 +122,7 @@ def draw_map(
             )
             notes.append(f"and lower end of its {100 * confidence:g} % interval")
         figure.suptitle("\n".join(notes), x=0.02, ha="left", fontsize=9)
-        tight(figure)
+        fit_axes_to_texts(figure)
         if image is not None:
             figure.colorbar(image, ax=list(grid.flat), label=readable(metric), shrink=0.9)
 

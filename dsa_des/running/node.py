@@ -93,11 +93,11 @@ class Node:
         return self.component if self.stretched is None else self.stretched.now
 
     @property
-    def things(self) -> list[object]:
+    def state_objects(self) -> list[object]:
         """All whose attributes hold its state."""
         failing = [] if self.outages is None else [self.outages]
         if self.stretched is not None:
-            return [*failing, *self.stretched.things]
+            return [*failing, *self.stretched.state_objects]
         return [*failing, self.component, *self.component.context.effects.values()]
 
     @property
@@ -213,7 +213,7 @@ class Node:
             clocks += [(demand.clock, demand.lead_ticks) for demand in self.demands]
         if self.pulse is not None:
             clocks.append((self.pulse, 0))
-        ticks = [clock.none_before(start + lead) - lead for clock, lead in clocks]
+        ticks = [clock.next_scan_bound(start + lead) - lead for clock, lead in clocks]
         ticks += [wire.quiet_until() for wire in self._trigger_wires]
         return max(start, min(ticks, default=MAX_TICK))
 
@@ -287,7 +287,7 @@ class Node:
     def _run(
         self, instants: RunTicks, scans: IntArray, end: int, idle: BoolArray | None = None
     ) -> None:
-        before = None if self.clock is None else self.clock.before
+        before = None if self.clock is None else self.clock.previous_ticks
         if self.outages is not None and not (up := self.outages.is_up(instants)).all():
             instants, scans = instants.take(up), scans[up]
             idle = None if idle is None else idle[up]

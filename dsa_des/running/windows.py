@@ -83,7 +83,7 @@ class RunningBlock(Protocol):
         """The block itself."""
 
     @property
-    def things(self) -> Sequence[object]:
+    def state_objects(self) -> Sequence[object]:
         """All whose attributes hold its state."""
 
     @property
@@ -179,7 +179,7 @@ class Rewinder:
     ) -> None:
         self._recorder = recorder
         self._things: list[Any] = [
-            thing for node in nodes for thing in node.things if hasattr(thing, "__dict__")
+            thing for node in nodes for thing in node.state_objects if hasattr(thing, "__dict__")
         ]
         self._things.append(runs)
         into = [(node.name, channel) for node in nodes for channel in node.wires]
