@@ -24,8 +24,8 @@ from dsa_des.record.recording import NotRecordedError, Recorder
 from dsa_des.record.undone import Undone, UndoneByRun, sum_runs
 from dsa_des.running.assembly import Assembly
 from dsa_des.running.effects import Planned, WrapEffect, timing_plan
+from dsa_des.running.events import Abort
 from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
-from dsa_des.running.node import Abort
 from dsa_des.running.nodes import (
     build_nodes,
     build_processors,
