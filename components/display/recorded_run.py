@@ -75,7 +75,7 @@ class RecordedTables:
 
     @cached_property
     def own_name(self) -> str:
-        """What others call the ownship: who carries blocks or is seen, and is no target in truth."""
+        """What others call the ownship: who carries blocks or is seen, but is no true target."""
         if not self.carrying:
             return OWNSHIP
         seen = {name: None for table in ("detections", "tracks", "alerts")
