@@ -123,8 +123,8 @@ class Simulation:
             scene, timeline, recorder, simulate_everything, wrap_effect, grain.rewinds
         )
         self.components: Mapping[str, Component] = assembly.components
-        #: What carries each block, where blocks are on several platforms; else nothing.
-        self.platforms = assembly.platforms if len(set(assembly.platforms.values())) > 1 else {}
+        #: What carries each block; nothing where one carries all, and that is the first of all.
+        self.platforms = assembly.platforms if assembly.is_shared else {}
         #: The blocks of each stretch of time between two changes, and what became of their effects.
         self.stretches, self.plans = assembly.stretches, assembly.plans
         self.unheard = assembly.unheard
