@@ -54,8 +54,7 @@ class Weather(Parameters):
     )
     cells: tuple[WeatherCell, ...] = Field(
         default=(),
-        description="Rain and fog that are somewhere, and move: [[weather.cells]]; for radars and "
-        "cameras.",
+        description="Rain and fog that are somewhere, and move: [[weather.cells]].",
     )
 
     wind_mps: float = Field(
