@@ -50,7 +50,7 @@ POINTS = [{"kind": "waypoints", "points": [{"lat_deg": -41.2, "lon_deg": 175.0, 
 LEVEL = {"heights": "pressure"}
 
 
-@covers("heights", of=("traffic.scripted",))
+@covers("ownship.heights", "intruders.heights", of=("traffic.scripted",))
 def test_levels_of_pilots_are_flown_where_the_air_has_these_pressures():
     crafts = [
         at(-41.3, name="level", alt_m=1000, **LEVEL),
@@ -73,7 +73,7 @@ def test_levels_of_pilots_are_flown_where_the_air_has_these_pressures():
     assert altimeter_m(heights["points"])[[0, -1]] == pytest.approx([1000, 1500], abs=0.01)
 
 
-@covers("heights", of=("traffic.random",))
+@covers("ownship.heights", of=("traffic.random",))
 def test_random_traffic_is_spread_about_the_ownships_level():
     own = at(-41.3, alt_m=1000, **LEVEL)
     spread = {"intruders": 3, "radius_km": 5, "altitude_spread_m": 0}
@@ -82,7 +82,7 @@ def test_random_traffic_is_spread_about_the_ownships_level():
         assert altimeter_m(heights[name]) == pytest.approx(1000, abs=0.01)
 
 
-@covers("heights", of=("traffic.encounters", "traffic.encounter_model"))
+@covers("heights", "scripted_ownship.heights", of=("traffic.encounters", "traffic.encounter_model"))
 def test_encounters_pass_each_other_by_altitudes_of_the_scene_s_air(tmp_path):
     (tmp_path / "set.toml").write_text(
         "closest_s = 20\nhorizontal_ft = 0\nvertical_ft = 500\nbearing_deg = 70\n"
@@ -92,6 +92,9 @@ def test_encounters_pass_each_other_by_altitudes_of_the_scene_s_air(tmp_path):
     block = {"type": "traffic.encounters", "file": str(tmp_path / "set.toml")}
     _, plain = flown(block)
     _, heights = flown({**block, **LEVEL})
+    own = {"lat_deg": -41.3, "lon_deg": 179.99, "alt_m": 1000}
+    _, scripted = flown({**block, "scripted_ownship": {**own, **LEVEL}}, 4)
+    assert altimeter_m(scripted["own"]) == pytest.approx(1000, abs=0.01)
     for name in plain:
         assert altimeter_m(heights[name]) == pytest.approx(plain[name], abs=0.01)
     # 500 ft of altimeters are 7 % and some QNH more in warm air.
@@ -105,14 +108,17 @@ def test_heights_that_a_file_has_above_the_sea_are_put_above_the_ellipsoid(tmp_p
         f"<trkpt lat='{-41.3 + 0.0006 * k}' lon='175'><ele>900</ele>"
         f"<time>2024-06-01T12:00:{k:02d}Z</time></trkpt>" for k in range(21)
     )  # fmt: skip
-    track = f"<gpx xmlns='http://www.topografix.com/GPX/1/1'><trk><trkseg>{rows}</trkseg></trk></gpx>"
+    track = (
+        f"<gpx xmlns='http://www.topografix.com/GPX/1/1'><trk><trkseg>{rows}</trkseg></trk></gpx>"
+    )
     (tmp_path / "drone.gpx").write_text(track)
     for header in ("geoaltitude", "alt_msl", "alt"):
         lines = [f"{1717243200 + k},a,-41.2,175.01,{1000 + k}" for k in range(21)]
         (tmp_path / f"{header}.csv").write_text(f"time,id,lat,lon,{header}\n" + "\n".join(lines))
 
     def of(name, **keys):
-        files = {"file": str(tmp_path / name), "own_file": str(tmp_path / "drone.gpx")}
+        files = {"file": str(tmp_path / name)}
+        files |= {} if "own_flight" in keys else {"own_file": str(tmp_path / "drone.gpx")}
         simulation, heights = flown({"type": "traffic.file", **files, **keys})
         said = simulation.components["traffic"]
         return heights, " ".join([*said.content.notes, *said.warnings()])
@@ -122,6 +128,8 @@ def test_heights_that_a_file_has_above_the_sea_are_put_above_the_ellipsoid(tmp_p
         assert heights["own"] == pytest.approx(900 + GEOID_M, abs=1e-9)
         assert heights["a"][0] == pytest.approx(from_m, abs=1e-9)
         assert "above sea level, flown +47 m above the ellipsoid" in said
+    own = at(-41.3, alt_m=900, heights="sea_level")
+    assert of("alt.csv", own_flight=own)[0]["own"] == pytest.approx(900 + GEOID_M, abs=1e-9)
     heights, said = of("alt.csv", heights="sea_level")
     assert heights["a"][0] == pytest.approx(1000 + GEOID_M, abs=1e-9)
     assert heights["own"] == pytest.approx(900 + GEOID_M, abs=1e-9)
