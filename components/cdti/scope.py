@@ -22,6 +22,7 @@ from components.cdti.contacts import (
     contacts_of_states,
 )
 from components.cdti.loss_area import predicted_loss_area
+from components.cdti.sensors import describe_sensors, longest_silences_s, silent_sensors
 from components.messages.alerts import (
     BAND_KINDS,
     BAND_REGIONS,
@@ -30,12 +31,11 @@ from components.messages.alerts import (
     contact_name,
 )
 from components.messages.decisions import Decisions
-from components.messages.detections import Detections, SensorOffer
+from components.messages.detections import Detections
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
-from components.sensor.marks import IR
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
@@ -47,8 +47,6 @@ from dsa_des.text.safe_text import printable
 FORGOTTEN_S = 10.0
 #: Bands of guidance stand for so long, s: until the alerting has looked again.
 BANDS_LAST_S = 1.5
-#: A sensor from which nothing has come for so many of its scans, and so long, is said to be out.
-_SILENT_SCANS, _SILENT_S = 2.5, 1.0
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 _LOOKAHEAD_S = 120.0
 _UNKNOWN = (None, None, None)
@@ -107,7 +105,7 @@ class Scope:
         #: What was made of the latest alerts, for as long as they are the latest.
         self._looked: tuple[_Alerts, Any, Any, Any] | None = None
         self._heard: dict[str, float] = {}
-        self._silence_s = _longest_silence_s(simulation)
+        self._silence_s = longest_silences_s(simulation)
         self._names: tuple[str, ...] = ()
         #: Names of all targets, fit to be shown.
         self.names: list[str] = []
@@ -120,11 +118,7 @@ class Scope:
         kinds = (StateTracks, Tracks, FusedDetections)
         #: What contacts are taken from: the best that the scene has.
         self._believed = next((k for k in kinds if any(issubclass(t, k) for t in senders)), None)
-        self.sensors = [
-            _sensor(name, component)
-            for name, component in sorted(components.items())
-            if any(issubclass(o.message, Detections) for o in component.outputs.values())
-        ]
+        self.sensors = describe_sensors(components)
 
     # -- the thread of the simulation ------------------------------------------------------------
 
@@ -274,11 +268,7 @@ class Scope:
             "alerts": said,
             "area": area,
             "bands": _bands_at(bands, time_s),
-            "out": [
-                printable(name)
-                for name, longest_s in self._silence_s.items()
-                if time_s - heard.get(name, 0.0) > longest_s
-            ],
+            "out": silent_sensors(self._silence_s, heard, time_s),
         }
 
     def camera(self, picture: dict[str, Any], time_s: float, chosen: int) -> dict[str, Any] | None:
@@ -404,40 +394,3 @@ def _rules_of(components: Mapping[str, Component]) -> tuple[Configuration, Alert
             configuration = read_conf(component.p.conf)
             return configuration, configuration.alerters[component.p.alerter - 1]
     return None
-
-
-def _longest_silence_s(simulation: Simulation) -> dict[str, float]:
-    """Return after which silence each sensor is out, s: those that are switched on at the start."""
-    scene, result = simulation.scene, dict[str, float]()
-    for name, component in sorted(simulation.components.items()):
-        sends = any(issubclass(o.message, Detections) for o in component.outputs.values())
-        if not sends or not getattr(component.p, "enabled", True):
-            continue
-        every = [
-            one.blocks[name].parameters for one in (scene, *(s.scene for s in scene.stretches))
-        ]
-        clocks = [clock for p in every if (clock := component.clock_of(p)) is not None]
-        if clocks:
-            slowest_s = max(float(1 / clock.rate_hz) for clock in clocks)
-            first_s = max(float(clock.offset_s) for clock in clocks)
-            result[name] = max(_SILENT_SCANS * slowest_s, _SILENT_S) + first_s
-    return result
-
-
-def _sensor(name: str, component: Component) -> dict[str, Any]:
-    """Return where a sensor looks, deg and m; what is not known is None."""
-    offer: SensorOffer = component.offer("detections")
-    kind = "radar" if offer.measures_range else "ir" if component.mark is IR else "eo"
-    reach = offer.reach
-    result: dict[str, Any] = {"name": printable(name), "kind": kind}
-    if reach is None or not reach.enabled:
-        return {**result, "range": None, "azimuth": None}
-    # Bounds are in the sensor's axes.
-    turned_deg = getattr(component.p, "mount_azimuth_deg", 0.0)
-    low, high = (round(math.degrees(edge) + turned_deg, 3) for edge in reach.azimuth_rad)
-    far = getattr(component, "reach", reach).range_max_m
-    return {
-        **result,
-        "range": round(far, 1) if math.isfinite(far) else None,
-        "azimuth": [low, high],
-    }

@@ -79,19 +79,27 @@ def _by_platform(run: RecordedTables) -> dict[str, FloatArray]:
 
 
 def _stretches(run: RecordedTables) -> dict[str, list[tuple[int, float, float]]]:
-    """Return the alerts of each target; each lasts until the alerting looks again."""
+    """Return the alerts of each target; each lasts until what alerts looks again."""
     level = run.numbers("alerts", "level").astype(np.int64)
     time_s = run.numbers("alerts", "time_s")
-    looks = np.unique(time_s)
-    last = float(np.median(np.diff(looks))) if len(looks) > 1 else 0.0
-    ends = np.append(looks[1:], looks[-1] + last)
+    block = np.array(run.texts("alerts", "block") if run.has("alerts", "block") else [""])
+    block = np.broadcast_to(block, level.shape)
+    each = {name: np.unique(time_s[block == name]) for name in np.unique(block).tolist()}
+    last = {n: float(t[-1] + (np.median(np.diff(t)) if len(t) > 1 else 0)) for n, t in each.items()}
+    looks = np.unique(np.append(time_s, [*last.values()]))
+    ends = np.append(looks[1:], looks[-1])
     on = np.flatnonzero(level > 0)
     targets = np.array(run.tables["alerts"]["target"].take(on).to_pylist(), dtype=object)
     result: dict[str, list[tuple[int, float, float]]] = {}
     for target in sorted({name for name in targets.tolist() if name is not None}):
-        mine = on[targets == target]
         highest = np.zeros(len(looks), dtype=np.int64)
-        np.maximum.at(highest, np.searchsorted(looks, time_s[mine]), level[mine])
+        for name, mine in each.items():
+            here = on[(targets == target) & (block[on] == name)]
+            said = np.zeros(len(mine), dtype=np.int64)
+            np.maximum.at(said, np.searchsorted(mine, time_s[here]), level[here])
+            look = np.searchsorted(mine, looks, side="right") - 1
+            stands = (look >= 0) & ((looks < last[name]) | (looks == mine[-1]))
+            highest = np.maximum(highest, np.where(stands, said[look], 0))
         edges = np.flatnonzero(np.diff(highest, prepend=-1, append=-1))
         result[target] = [
             (int(highest[a]), float(looks[a]), float(ends[b - 1]))

@@ -36,17 +36,16 @@ from components.messages.known_flights import KnownFlights
 from components.messages.reach import farthest_look
 from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates, TrueStates
-from components.traffic.flown_flights import (
+from components.traffic.flown_flights import FlightsOfRuns, FlownFlights, WithOthers
+from components.traffic.recorded_truth import truth_is_recorded
+from components.traffic.steering import (
     Coming,
-    FlightsOfRuns,
-    FlownFlights,
-    WithOthers,
     arrived_manoeuvres,
     due_manoeuvres,
     steer,
+    steered_platforms,
 )
-from components.traffic.recorded_truth import truth_is_recorded
-from components.traffic.views import Seen, View
+from components.traffic.views import Seen, views_of
 from components.traffic.wind_effect import ATTITUDE
 from dsa_des.arrays.run_ticks import runs_of_single
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -165,7 +164,7 @@ class TrafficSource(Component):
         """Learn who looks and is steered, and how far sensors look; what is beyond is not moved."""
         self._check_terrain(self.own.at)
         #: Which platform each block steers.
-        self._steers = self._by_block()
+        self._steers = steered_platforms(self.context.producers, self._index, self.unseen)
         asked: dict[int, list[Any]] = {-1: []}
         for consumer in self.context.consumers:
             asked.setdefault(self._index(consumer.platform), []).append(consumer.request)
@@ -188,26 +187,6 @@ class TrafficSource(Component):
             )
         return names.index(platform)
 
-    def _by_block(self) -> dict[str, int]:
-        """Return which platform each block steers; one that two steer is refused."""
-        steering: dict[int, str] = {}
-        for producer in self.context.producers:
-            index = self._index(producer.platform)
-            if index in self.unseen:
-                raise ValueError(
-                    f"{producer.block} is on {producer.platform!r}, which stands and is not "
-                    "steered: on the way from there to an aircraft a block must say that it is on "
-                    "that one (platform = ...)"
-                )
-            other = steering.setdefault(index, producer.block)
-            if other != producer.block:
-                raise ValueError(
-                    f"{other} and {producer.block} both steer {producer.platform!r}: one block "
-                    f"decides for each aircraft; put one of them on another (platform = ...), or "
-                    "leave its wire out"
-                )
-        return {block: platform for platform, block in steering.items()}
-
     def _flights(self, platforms: Sequence[int]) -> FlownFlights:
         """Return this run's own flights, with the ownship and targets as platforms."""
         return FlownFlights.of(fleet_of([self.own]), self.targets, platforms)
@@ -225,16 +204,7 @@ class TrafficSource(Component):
         steer = sorted(self._steers.values()) if self.context.producers else None
         duration_s = float(self.context.duration_s)
         #: What each platform may look at, the ownship's first.
-        self._views = [
-            View(
-                flights,
-                viewer,
-                look if culls else replace(look, range_m=math.inf),
-                duration_s + look.lasts_s,
-                steer,
-            )
-            for viewer, look in self._looks.items()
-        ]
+        self._views = views_of(flights, self._looks, culls, duration_s, steer)
         self._flown = replace(
             flights,
             crabbing=self.built(ATTITUDE),

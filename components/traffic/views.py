@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -97,6 +98,26 @@ class View:
     ) -> TrajectoryState | None:
         """Return the state of the ownship; other platforms are moved as targets are."""
         return flown.platform_at(-1, run, time_s, state=state) if self.viewer < 0 else None
+
+
+def views_of(
+    flights: FlownFlights,
+    looks: Mapping[int, FarthestLook],
+    culls: bool,
+    duration_s: float,
+    steered: Sequence[int] | None,
+) -> list[View]:
+    """Return what each platform may look at; all the time at everything unless it `culls`."""
+    return [
+        View(
+            flights,
+            viewer,
+            look if culls else replace(look, range_m=math.inf),
+            duration_s + look.lasts_s,
+            steered,
+        )
+        for viewer, look in looks.items()
+    ]
 
 
 class Seen:

@@ -124,6 +124,9 @@ class Assembly:
     def _assign_platforms(self) -> None:
         """Tell every block what carries it, which no change alters."""
         self.platforms = platforms_of(self._scene, self._sources)
+        on, first = set(self.platforms.values()), {names[0] for names in self._sources.values()}
+        #: Whether blocks are on several platforms, or on another one than the first.
+        self.is_shared = len(on) > 1 or bool(self._sources and on - first)
         for components in self.stretches:
             for name, platform in self.platforms.items():
                 components[name].context.platform = platform

@@ -26,45 +26,20 @@ from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake, checked_messages
 from dsa_des.errors import RunRefused
 from dsa_des.running.channel import Channel, Inputs
-from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
+from dsa_des.running.events import (
+    LEAVE_PRIORITY,
+    Abort,
+    Bell,
+    BlockEnvironment,
+    RunState,
+    WakeUp,
+)
 from dsa_des.running.processors import Processor
-from dsa_des.running.windows import Window
+from dsa_des.running.windows import Demand, Window
 from dsa_des.stretches.outages import Outages
 from dsa_des.stretches.stretched_block import StretchedBlock
 from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.run_clock import RunClock
-
-
-@dataclass
-class Demand:
-    """A clocked block downstream, and how long before its scan it needs our row."""
-
-    block: str
-    clock: RunClock
-    lead_ticks: int
-
-    def instants_between(self, start: int, end: int) -> RunTicks:
-        """Return the instants in [start, end) at which this block needs a row.
-
-        None of these rows would arrive after the end of the run, where the clock has no scan.
-        """
-        _, instants = self.clock.between(start + self.lead_ticks, end + self.lead_ticks)
-        return instants.later(-self.lead_ticks) if self.lead_ticks else instants
-
-
-# SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
-WINDOW_PRIORITY = 1.0
-DEPTH_PRIORITY = 1000.0
-# What a block sends later than it is made is there before any block runs.
-LEAVE_PRIORITY = 0.5
-
-
-class Abort(Exception):
-    """Leaves SimPy after a block failed; the failure itself is kept by the simulation.
-
-    SimPy rebuilds an exception from its ``args``, which breaks those that need keywords, so the
-    original never travels through it.
-    """
 
 
 @dataclass

@@ -19,11 +19,13 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.channel import Channel
+from dsa_des.time.run_clock import RunClock
 from dsa_des.time.runs import Runs
 
 
@@ -48,6 +50,23 @@ class Failure:
     said: BlockFailure
     cause: BaseException
     ticks: IntArray
+
+
+@dataclass
+class Demand:
+    """A clocked block downstream, and how long before its scan it needs our row."""
+
+    block: str
+    clock: RunClock
+    lead_ticks: int
+
+    def instants_between(self, start: int, end: int) -> RunTicks:
+        """Return the instants in [start, end) at which this block needs a row.
+
+        None of these rows would arrive after the end of the run, where the clock has no scan.
+        """
+        _, instants = self.clock.between(start + self.lead_ticks, end + self.lead_ticks)
+        return instants.later(-self.lead_ticks) if self.lead_ticks else instants
 
 
 class RunningBlock(Protocol):
