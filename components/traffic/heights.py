@@ -2,7 +2,6 @@
 
 from typing import Any, Literal
 
-from numpy.typing import ArrayLike
 from pydantic import Field
 
 from components.atmosphere.pressure_altitude import Air
@@ -19,7 +18,7 @@ class Heights(Parameters):
         "flown where the air of `[weather]` has these pressures.",
     )
 
-    def height_m(self, air: Air | None, altitude_m: ArrayLike) -> Any:
+    def height_m(self, air: Air | None, altitude_m: Any) -> Any:
         """Return altitudes as heights above the ellipsoid, in a scene's air.
 
         None is the standard's, in which they are the same numbers.
