@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration
+from components.atmosphere.pressure_altitude import scene_air
 from components.cdti.camera import CameraSights
 from components.cdti.contacts import (
     Contacts,
@@ -94,6 +95,7 @@ class Scope:
         #: Blocks whose messages are shown.
         self._on_board = frozenset(components)
         self._own = OwnFlight()
+        self._air = scene_air(simulation.scene.sections)
         self._sights = CameraSights(components)
         self._contacts: Contacts | None = None
         self._alerts: _Alerts | None = None
@@ -231,6 +233,9 @@ class Scope:
                 "own": None, "contacts": [], "alerts": [], "area": [], "bands": {}, "out": []
             }  # fmt: skip
         shown = [] if contacts is None else contacts.rows_to_show(own, time_s, FORGOTTEN_S)
+        # What is reported is a pressure altitude, and compared with the ownship's own.
+        air = self._air
+        own_m = own.alt_m if air is None else float(air.pressure_altitude_m(own.alt_m))
         flights: dict[int, list[float]] = {}
         said: list[dict[str, Any]] = []
         area: list[list[float]] = []
@@ -248,7 +253,7 @@ class Scope:
             flight = [*flights.get(one[0], _UNKNOWN)]
             alt_m, climb, seen_s = reported.get(one[0], (math.nan, math.nan, -math.inf))
             if time_s - seen_s < FORGOTTEN_S and one[3] is not None:
-                one[3] = round(alt_m - own.alt_m, 2)
+                one[3] = round(alt_m - own_m, 2)
                 flight[2] = round(climb, 2) if math.isfinite(climb) else flight[2]
             one += flight
             one.append(level.get(one[0], 0))

@@ -90,7 +90,7 @@ class Mountains(Effect[Hides]):
         raster = terrain.raster.raster
         return _ask_for_present(
             lambda a, b: is_behind_terrain(
-                a, b, raster, offset_m=terrain.raster_offset_m, refraction=terrain.refraction
+                a, b, raster, offset_m=terrain.raster_zero_m, refraction=terrain.refraction
             )
         )
 

@@ -24,13 +24,6 @@ def weather_cells(block: Any) -> tuple[WeatherCell, ...]:
     return cells
 
 
-def cells_warnings(block: Any) -> list[str]:
-    """Say that cells of weather do nothing to a sensor, whose air is the same everywhere."""
-    if not weather_cells(block) or not block.p.enabled:
-        return []
-    return ["[weather] cells: no effect on this sensor; only weather that is everywhere has one"]
-
-
 def cells_verdict(block: Any) -> Verdict:
     """Say whether a cell comes near any line of sight of a sensor, as far as can be known."""
     cells = weather_cells(block)

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.known_targets import known_targets
-from components.atmosphere.pressure_altitude import pressure_altitude_m, scene_air
+from components.atmosphere.pressure_altitude import Air, scene_air
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.reach import Reach
 from components.sensor.look import Cells
@@ -101,16 +101,15 @@ class CooperativeSensor(Sensor):
         return replace(reach, lasts_s=4.0 * STEP_S) if self.p.enabled else reach
 
     @cached_property
-    def _air(self) -> dict[str, float]:
+    def _air(self) -> Air | None:
         """The atmosphere, where it is not the standard's."""
-        return scene_air(self.context.sections.get("weather"))
+        return scene_air(self.context.sections)
 
     def altimeter_m(self, height_m: FloatArray) -> FloatArray:
         """Return what altimeters read at heights, but for their errors, m."""
-        if not self._air:
+        if self._air is None:
             return height_m
-        altitude: FloatArray = pressure_altitude_m(height_m, **self._air)
-        return altitude
+        return np.asarray(self._air.pressure_altitude_m(height_m))
 
     def heights_m(self, cells: Cells, which: AnyArray, altitude_m: FloatArray) -> FloatArray:
         """Return which heights reported pressure altitudes of some cells are taken for."""
@@ -121,15 +120,16 @@ class CooperativeSensor(Sensor):
 
     def _note_pressure_heights(self) -> list[str]:
         """Say by how much pressure altitudes are off where they are taken for heights."""
-        if not self._air or self.p.heights != "reported":
+        if self._air is None or self.p.heights != "reported":
             return []
         low_m, high_m = self.altimeter_m(np.array([0.0, 3000.0])) - np.array([0.0, 3000.0])
         stated = self.p.pressure_deviation_m
         said = f"stated with a deviation of {stated:g} m" if stated else "nobody is told"
         return [
-            f"heights is 'reported': pressure altitudes, off by {low_m:+.0f} m at sea level and "
-            f"{high_m:+.0f} m at 3,000 m ([weather] qnh_hpa, temperature_offset_c), are compared "
-            f"with heights as if they were such, and {said}; 'by_own_altimeter' takes that off"
+            f"heights is 'reported': pressure altitudes, off by {low_m:+.0f} m at 0 m and "
+            f"{high_m:+.0f} m at 3,000 m in the air of [weather] (qnh_hpa, temperature_offset_c), "
+            f"are compared with heights as if they were such, and {said}; 'by_own_altimeter' takes "
+            "that off"
         ]
 
     def warnings(self) -> list[str]:

@@ -13,6 +13,7 @@ from pydantic import Field
 
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.aircraft.known_targets import KnownTraffic
+from components.atmosphere.pressure_altitude import Air, scene_air
 from components.flights.attitude import Wind, scene_wind
 from components.flights.bounds import (
     FlightAt,
@@ -107,6 +108,11 @@ class TrafficSource(Component):
     def wind(self) -> Wind | None:
         """The scene's wind, or None."""
         return scene_wind(self.context.sections.get("weather"))
+
+    @property
+    def air(self) -> Air | None:
+        """The scene's air, or None for the standard's."""
+        return scene_air(self.context.sections)
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
@@ -213,7 +219,7 @@ class TrafficSource(Component):
         if terrain is not None and terrain.height_m is not None:
             check_above_terrain(own_at, terrain.height_m, end_s)
         if terrain is not None and terrain.raster is not None:
-            check_on_raster(own_at, terrain.raster.raster, terrain.raster_offset_m, end_s)
+            check_on_raster(own_at, terrain.raster.raster, terrain.raster_zero_m, end_s)
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:

@@ -13,6 +13,8 @@ import dsa_des
 #: Of [weather]: 20 hPa below the standard are 168 m at sea level and less above.
 LOW = {"qnh_hpa": 993.25}
 WARM = {"temperature_offset_c": 20}
+#: The same air as rows of a sounding.
+SOUNDING = {"temperature_profile_c": [[0, 35], [3000, 15.5]]}
 ADS_B = {"type": "surveillance.ads_b", "reception": "certain", "position_errors": "none",
          "compact": False}  # fmt: skip
 ACTIVE = {"type": "surveillance.active", "replies": "certain", "measurement": "exact",
@@ -62,12 +64,19 @@ def altimeter_m(height_m, qnh_hpa=1013.25, temperature_offset_c=0.0):
     return 288.15 / 0.0065 * (1 - share) + share * warmth * height_m
 
 
-@covers("qnh_hpa", "temperature_offset_c", of=("[weather]",))
-@pytest.mark.parametrize("weather", [LOW, WARM, {**LOW, **WARM}, {"qnh_hpa": 1030}])
+@covers("qnh_hpa", "temperature_offset_c", "temperature_profile_c", of=("[weather]",))
+@covers("geoid_undulation_m", of=("[terrain]",))
+@pytest.mark.parametrize("geoid_m", [0, -32])
+@pytest.mark.parametrize("weather", [LOW, WARM, {**LOW, **SOUNDING}, {"qnh_hpa": 1030}])
 @pytest.mark.parametrize("sensor", [ADS_B, ACTIVE], ids=["ads_b", "active"])
-def test_transponders_report_pressure_altitudes_that_are_taken_for_heights(sensor, weather):
-    simulation, said, rise = heights(sensor, weather)
-    altitude = altimeter_m(1200, **weather)
+def test_transponders_report_pressure_altitudes_that_are_taken_for_heights(
+    sensor, weather, geoid_m
+):
+    top = {"terrain": {"geoid_undulation_m": geoid_m}}
+    simulation, said, rise = heights(sensor, weather, top=top)
+    by_hand = {**weather, **WARM} if "temperature_profile_c" in weather else weather
+    by_hand = {key: by_hand[key] for key in by_hand if "profile" not in key}
+    altitude = altimeter_m(1200 - geoid_m, **by_hand)
     assert said == pytest.approx(altitude, abs=0.05)
     assert rise == pytest.approx(altitude - 900, abs=1)
     assert "heights is 'reported'" in simulation.components["sensor"].warnings()[-1]
