@@ -206,11 +206,9 @@ times 500 ft over the radius:
 {layers}
 
 Of the encounters that are flown above {near:.1f} % are within 100 ft at the closest approach:
-they are weighted by relative speed, climb until then, and those that begin near each other are
-rejected, which the counts do not include. Climbs account for the rest, as entries through top and
-bottom. So rows are outside because of the distribution of altitudes, not of the counting of
-volumes: if altitudes are spread widely, as from 3000 ft up, encounters give the gas's number or
-less. Not open: the model and the ownship of the published numbers.
+they are weighted by relative speed and climb until then. Climbs account for the rest, as entries
+through top and bottom. So rows are outside because of the distribution of altitudes, not of the
+counting of volumes. Not open: the model and the ownship of the published numbers.
 """
 VOLUMES = {
     "nmac": PRESETS["nmac"],
