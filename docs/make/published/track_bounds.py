@@ -137,25 +137,7 @@ def text_of(lines: Lines) -> str:
                 alike.setdefault(table(lines, tracker, sensor), []).append(f"`{tracker}`")
         for text, trackers in alike.items():
             parts.append(f"**{sensor}, {' and '.join(trackers)}**\n\n{text}")
-    failed = [
-        f"- {sensor}, `{tracker}`: {said}"
-        for tracker, sensor in sorted(known, key=lambda one: one[1])
-        if (said := failures(lines, tracker, sensor))
-    ]
-    where = "\n".join(failed) or "Nowhere."
-    return "\n\n".join([*parts, f"**Bounds not met, or not shown.**\n\n{where}", _TAIL])
-
-
-def failures(lines: Lines, tracker: str, sensor: str) -> str:
-    """Return which bounds a tracker does not meet, and at which ranges, of a sensor."""
-    found = []
-    for name, what, _, bound in BOUNDS[sensor]:
-        for kind in ("not met", "not shown"):
-            at = [r for r in RANGES_NMI
-                  if verdict(lines[tracker, sensor, f"{name}.{r}"], bound(r)) == kind]  # fmt: skip
-            if at:
-                found.append(f"{what} {kind} at {', '.join(map(str, at))} nmi")
-    return "; ".join(found)
+    return "\n\n".join([*parts, _TAIL])
 
 
 def _ranges(found: list[int]) -> str:

@@ -199,9 +199,8 @@ relative speeds at the closest approach, of {level:.0f} ft/s over ground and {cl
 
 Level flights alone would give r h / (R H): 0.0165, 0.0082, 0.0041, 0.0027. In a gas all
 differences of height are equally likely, so of those within 1000 ft a tenth are within 100 ft.
-For aircraft of the model that an ownship at 1200 to 3000 ft meets they are not: few fly much
-higher or lower. Without any flight or draw, by the counts of altitudes in the model's file, and
-times 500 ft over the radius:
+For aircraft that an ownship at 1200 to 3000 ft meets they are not. By the counts of altitudes in
+the model's file, and times 500 ft over the radius:
 
 {layers}
 
