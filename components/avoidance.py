@@ -153,7 +153,7 @@ class TurnOut(Component):
     def run(self, wake: Wake) -> dict[str, Message]:
         """Look at every instant with an alert."""
         alerts: AlertLevels | None = wake["alerts"]
-        self._hear(wake)
+        self._take_choices(wake)
         if alerts is None:
             return {}
         manoeuvres: dict[int, Manoeuvre] = {}
@@ -195,7 +195,7 @@ class TurnOut(Component):
         }
         return {port: message for port, message in messages.items() if message is not None}
 
-    def _hear(self, wake: Wake) -> None:
+    def _take_choices(self, wake: Wake) -> None:
         """Take in the latest choice of each other aircraft."""
         since = int(wake.ticks[0]) - int(self.p.heeds_s * self.context.ticks_per_s)
         for new in wake.arrivals("told") if self.p.address is not None else ():

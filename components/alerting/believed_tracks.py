@@ -125,7 +125,7 @@ class EstimatedFlights:
         if len(given) == 0 or self._others is None or own_velocity is None:
             return instant, tracks.number, state, deviations, age_s
         of = instant[given]
-        is_own, theirs = self._others.judged(
+        is_own, theirs = self._others.judge_tracks(
             tracks.take(given), ahead_s[given], own_place[:, of], own_velocity[:, of], of
         )
         for mine, values in zip(deviations, theirs, strict=True):

@@ -73,7 +73,7 @@ class LivePacer(Pacer):
 
     def start(self) -> None:
         """Let simulated time 0 be when nothing holds the run any more."""
-        self._hold()
+        self._wait_while_held()
         super().start()
 
     def __call__(self, time_s: float) -> None:
@@ -88,9 +88,9 @@ class LivePacer(Pacer):
         self.max_lag_s = max(self.max_lag_s, lag_s)
         self.total_lag_s += lag_s
         self._came_to(time_s, lag_s)
-        self._hold()
+        self._wait_while_held()
 
-    def _hold(self) -> None:
+    def _wait_while_held(self) -> None:
         """Wait while the run is held; its clock stands still meanwhile."""
         began = self.now()
         while not self.stopped and self._holds():
@@ -170,7 +170,7 @@ class SessionControl:
         wall_s = time.perf_counter()
         if wall_s - self._shown_at >= max(FRAME_S, self._made_s / _SHARE):
             self._shown_at = wall_s
-            self._server.show()
+            self._server.announce_picture()
 
     def sentence(self) -> str:
         """Return what was decided, for the terminal."""
@@ -208,7 +208,7 @@ class SessionControl:
         self._operators = count
         self._pacer.wake()
         # A run that pauses now comes to no other instant, and the other pages are to know of it.
-        self._server.show()
+        self._server.announce_picture()
 
     def welcome(self, role: str) -> dict[str, Any]:
         """Return the first message to a new page: names, units and limits of the scene."""
@@ -251,7 +251,7 @@ class SessionControl:
         """Take in a message of a page."""
         if isinstance(message, Chosen):
             page.chosen = message.target
-            self._server.show()
+            self._server.announce_picture()
             return
         if page.role != OPERATOR:
             number = getattr(message, "id", None)

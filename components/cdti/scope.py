@@ -89,7 +89,7 @@ class Scope:
 
     def __init__(self, simulation: Simulation, platform: str | None = None) -> None:
         self._per_s = simulation.ticks_per_s
-        self._platform = _shown(simulation, platform)
+        self._platform = _display_platform(simulation, platform)
         on = "", self._platform
         components = {n: c for n, c in simulation.components.items() if c.context.platform in on}
         #: Blocks whose messages are shown.
@@ -364,7 +364,7 @@ def _flights(alerts: _Alerts) -> dict[int, list[float]]:
     return {int(t): flight for t, flight in zip(alerts.target, rounded, strict=True)}
 
 
-def _shown(simulation: Simulation, platform: str | None) -> str:
+def _display_platform(simulation: Simulation, platform: str | None) -> str:
     """Return what carries a display: what is asked for, else what carries the console.
 
     Empty where nothing is known to carry a block; `UsageError` for what carries none.

@@ -34,7 +34,7 @@ class Alerted:
         run = RecordedTables(folder, {n: read_table(folder / f"{n}.parquet") for n in names})
         result = cls()
         if "manoeuvres" in names:
-            result.manoeuvres = _by_platform(run)
+            result.manoeuvres = _manoeuvre_times_by_platform(run)
         if "alerts" in names and run.tables["alerts"].num_rows:
             result.stretches = _stretches(run)
         return result
@@ -69,7 +69,7 @@ def style_of(level: int) -> tuple[str, float]:
     return _LEVELS[min(level, len(_LEVELS)) - 1]
 
 
-def _by_platform(run: RecordedTables) -> dict[str, FloatArray]:
+def _manoeuvre_times_by_platform(run: RecordedTables) -> dict[str, FloatArray]:
     """Return the times of manoeuvres by whom they steer."""
     time_s = run.numbers("manoeuvres", "time_s")
     on = np.full(len(time_s), "", dtype=object)

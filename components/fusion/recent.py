@@ -47,7 +47,7 @@ class Recent:
             seen[name], _ = _rows(all_seen, used[name], young)
         return together, type(self)(seen, used, kept)
 
-    def used_of(self, arrivals: Mapping[str, Arrivals]) -> BoolArray:
+    def were_used(self, arrivals: Mapping[str, Arrivals]) -> BoolArray:
         """Return which entries were used before, of what `with_new` gave, one after the other.
 
         Of anything else none is known to be.

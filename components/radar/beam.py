@@ -210,7 +210,7 @@ class Sweep:
         }
         self._ticks_per_s = block.context.ticks_per_s
 
-    def lit(
+    def illuminate(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
     ) -> LitTargets:
         """Return the targets as the beam meets them, one row per scan.
@@ -338,4 +338,4 @@ class SweepingSensor(Sensor):
         """Return the targets at the instants at which the beam lights them."""
         if self._sweep is None:
             return targets, rows
-        return self._sweep.lit(targets, rows, cued), np.arange(len(rows))
+        return self._sweep.illuminate(targets, rows, cued), np.arange(len(rows))

@@ -243,7 +243,7 @@ class GroundReports:
         elevation_rad = -np.arcsin(np.clip(body_to_ned(*self._body, *turned)[2], -1.0, 1.0))
         parts = [
             (depth + beam * self._cells.range, *self._clutter(own_alt_m, depth, away))
-            for depth, beam, away in self._lit(own_alt_m, elevation_rad)
+            for depth, beam, away in self._lit_cells(own_alt_m, elevation_rad)
         ]
         if not parts:
             return np.empty(0, dtype=np.int64), np.empty(0)
@@ -261,7 +261,7 @@ class GroundReports:
         crossing = np.flatnonzero(draw < extra)
         return cell[crossing], cnr[crossing]
 
-    def _lit(
+    def _lit_cells(
         self, own_alt_m: float, elevation_rad: FloatArray
     ) -> Iterator[tuple[int, IntArray, FloatArray]]:
         """Give each range cell with clutter, the beams that meet it, and where they point."""

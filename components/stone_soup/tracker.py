@@ -57,7 +57,7 @@ class StoneSoupParameters(Parameters):
     state_size: int = Field(default=6, ge=6, le=100, description="Components of a state.")
 
     @model_validator(mode="after")
-    def _possible(self) -> Any:
+    def _check_places_of_state(self) -> Any:
         places = (*self.position_mapping, *self.velocity_mapping)
         if len(set(places)) != 6 or min(places) < 0 or max(places) >= self.state_size:
             raise ValueError(

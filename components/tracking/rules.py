@@ -62,7 +62,7 @@ class LastingErrors:
         return cls(step, variance, lasts_s, across_m2, share)
 
     @cached_property
-    def lasts(self) -> BoolArray:
+    def is_correlated(self) -> BoolArray:
         """Whether any error of each sensor is correlated; last False, for no sensor (-1)."""
         parts = (self.variance != 0.0) | (self.across_m2 != 0.0) | (self.share != 0.0)
         return np.append((self.step != 0.0).any(axis=0) | parts.any(axis=(0, 1)), False)
@@ -70,7 +70,7 @@ class LastingErrors:
     @cached_property
     def sensors(self) -> int:
         """Mask of the sensors any of whose errors is correlated."""
-        return sum(1 << i for i in np.flatnonzero(self.lasts).tolist())
+        return sum(1 << i for i in np.flatnonzero(self.is_correlated).tolist())
 
     @cached_property
     def _is_across_angles(self) -> bool:
@@ -239,7 +239,7 @@ class TrackerParameters(Parameters):
     )
 
     @model_validator(mode="after")
-    def _possible(self) -> Any:
+    def _check_confirmation(self) -> Any:
         if self.confirm_m > self.confirm_n:
             raise ValueError(
                 f"confirm_m = {self.confirm_m} hits cannot fall in confirm_n = {self.confirm_n} "

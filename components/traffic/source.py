@@ -248,7 +248,7 @@ class TrafficSource(Component):
             return None
         # A flight into the ground is said of its own replica, by itself.
         for number in range(len(parameters)):
-            self._check_terrain(partial(_one_of, flights.own, number))
+            self._check_terrain(partial(_states_of_one, flights.own, number))
         of_all = copy(self)
         flown = FlownFlights.of(flights.own, flights.targets, [*self._flown.platforms])
         of_all._fly(flown, flights.roster, parameters)
@@ -288,8 +288,8 @@ class TrafficSource(Component):
         flown = self._flown
         seen = Seen(self._views, flown, run, time_s)
         states = self._targets_at(run, seen.columns, time_s)
-        present, culled = seen.by_ownship(states.present)
-        others = seen.by_others(states.present, self.roster.names)
+        present, culled = seen.present_for_ownship(states.present)
+        others = seen.present_for_others(states.present, self.roster.names)
         truth = replace(flown, intervals={}, rates_hz=None, unseen=()) if self.says_truth else None
         asked = any(look.lasts_s > 0.0 for look in self._looks.values())
         return TrafficStates.of(
@@ -403,6 +403,6 @@ class TrafficSource(Component):
         return [*self.sample_times(), *grid]
 
 
-def _one_of(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
+def _states_of_one(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
     """Return the states of one flight of many at times (n,)."""
     return fleet.each(np.full(len(time_s), aircraft), time_s)

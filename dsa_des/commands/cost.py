@@ -79,7 +79,7 @@ def cost_of_accuracy(
         progress = CostProgress(silent=as_json)
         try:
             own = run_watched(variants.scene, {name for name, _ in climbs})
-            progress.say(foreseen(climbs, own, repeats), always=True)
+            progress.say(describe_duration(climbs, own, repeats), always=True)
             for number, (name, ladder) in enumerate(climbs, 1):
                 progress.say(f"{name}: {ladder.name} ({number} of {len(climbs)} ladders) ...")
                 try:
@@ -126,7 +126,7 @@ def cost_of_accuracy(
         sys.exit(130)
 
 
-def foreseen(climbs: Climbs, own: Mapping[str, RungRun], repeats: int) -> str:
+def describe_duration(climbs: Climbs, own: Mapping[str, RungRun], repeats: int) -> str:
     """Return how long climbing ladders takes if every rung costs as much as the scene's own."""
     if not climbs:
         return "no ladder to climb"

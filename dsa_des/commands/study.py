@@ -101,7 +101,9 @@ def show_command(folder: str, no_figures: bool, as_json: bool) -> None:
     show_study(Path(folder), draw=not no_figures, as_json=as_json)
 
 
-def begun_or_empty(location: "Path | Callable[[], Path]", resume: bool, what: str) -> None:
+def require_empty_or_resumed(
+    location: "Path | Callable[[], Path]", resume: bool, what: str
+) -> None:
     """Raise UsageError where a folder holds something that was not to be gone on with."""
     if isinstance(location, Path):
         check_place(location)

@@ -33,13 +33,13 @@ WIRES = "wires"
 CHANGED, AS_STATED = "changed", "as stated"
 
 
-def _printable(text: str) -> str:
+def _check_printable(text: str) -> str:
     if not text.strip():
         raise ValueError("must not be empty")
     return text
 
 
-_Text = Annotated[str, AfterValidator(_printable)]
+_Text = Annotated[str, AfterValidator(_check_printable)]
 
 
 class AssessedSystem(Parameters):

@@ -200,7 +200,7 @@ class Channel:
                 self._pass(new, end)
                 return new[1], rows
         before = concatenate(self._passed)
-        parts = [] if before is None else [_lasts(*_sort_rows(before))]
+        parts = [] if before is None else [_last_of_each_run(*_sort_rows(before))]
         held = concatenate(parts if new is None else [*parts, new])
         if held is None:
             return None
@@ -240,7 +240,7 @@ class Channel:
         first = runs.stop if end >= self._runs.run_ticks else runs.start
         going = [part for part in self._passed if part[0].run[-1] >= first]
         held = concatenate(going)
-        self._passed = [] if held is None else [_lasts(*_sort_rows(held))]
+        self._passed = [] if held is None else [_last_of_each_run(*_sort_rows(held))]
 
 
 def _rows(arrivals: RunTicks, message: Message, kept: BoolArray) -> Rows:
@@ -250,7 +250,7 @@ def _rows(arrivals: RunTicks, message: Message, kept: BoolArray) -> Rows:
     return arrivals.take(rows), message.take(rows)
 
 
-def _lasts(arrivals: RunTicks, message: Message) -> Rows:
+def _last_of_each_run(arrivals: RunTicks, message: Message) -> Rows:
     """Return the last row of each run."""
     if len(arrivals) == 1:
         return arrivals, message

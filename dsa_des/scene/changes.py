@@ -302,7 +302,7 @@ def stretches_of(
                 file.problems += set_value(file, text, value, source)
                 keys[text] = None
         try:
-            before = _sharing(check(file), [before, scene])
+            before = _share_equal_parts(check(file), [before, scene])
         except SceneError as error:
             scene_file.problems += error.problems
             continue
@@ -339,7 +339,7 @@ def _changes_in_force(changes: list[TimedChange], instant: Fraction) -> Iterator
             yield change
 
 
-def _sharing(scene: Any, others: list[Any]) -> Any:
+def _share_equal_parts(scene: Any, others: list[Any]) -> Any:
     """Return a scene that has in common with others what is equal in them."""
     blocks = {
         name: next((o.blocks[name] for o in others if o.blocks.get(name) == block), block)

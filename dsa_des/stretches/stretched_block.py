@@ -32,7 +32,7 @@ class StretchedBlock:
         return self._instances[self._now]
 
     @property
-    def things(self) -> list[object]:
+    def state_objects(self) -> list[object]:
         """All whose attributes hold the state of the block, this object among them."""
         each = {id(one): one for one in self._instances}.values()
         effects = [effect for one in each for effect in one.context.effects.values()]

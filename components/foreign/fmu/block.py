@@ -333,7 +333,7 @@ class ForeignFmu(Component):
             states.tick = ticks[there]
             states.flights = None
             for name, output in self.p.ownship.items():
-                place, a, b = wiring.outward(name, output)
+                place, a, b = wiring.output_conversion(name, output)
                 setattr(states, name, a * numbers[there, place] + b)
             sent["states"] = states
         if self.p.manoeuvre:
@@ -344,7 +344,7 @@ class ForeignFmu(Component):
 
     def _commands(self, ticks: IntArray, numbers: FloatArray) -> Manoeuvres | None:
         """Return the commands that are new, and not to do nothing."""
-        how = [self.p.wiring.outward(*item) for item in self.p.manoeuvre.items()]
+        how = [self.p.wiring.output_conversion(*item) for item in self.p.manoeuvre.items()]
         told = np.stack([a * numbers[:, place] + b for place, a, b in how], axis=1)
         before = np.vstack([self._told[np.newaxis], told[:-1]])
         changes = [place for place, name in enumerate(self.p.manoeuvre) if name in _CHANGES]

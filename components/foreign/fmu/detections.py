@@ -71,7 +71,7 @@ class _Column:
             variable = wiring.model.variables[output]
             if variable.kind in TEXT_KINDS:
                 raise ValueError(f"{output!r} is no number")
-            first, a, b = wiring.outward(name, output)
+            first, a, b = wiring.output_conversion(name, output)
             size = wiring.size(variable)
             if element is not None and not 0 <= element < size:
                 raise ValueError(f"{output!r} has the elements 1 to {size}")

@@ -125,7 +125,7 @@ class Wiring:
                 except ValueError as error:
                     self.wrong.append(f"{key}.{name}: {error}")
 
-    def outward(self, name: str, output: str) -> tuple[int, float, float]:
+    def output_conversion(self, name: str, output: str) -> tuple[int, float, float]:
         """Return where the numbers hold an output, and how it becomes a column: (place, a, b)."""
         code = self.names.index(output)
         place = next(i for i, (signal, _) in enumerate(self.layout) if signal == code)
