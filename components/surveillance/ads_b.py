@@ -268,9 +268,9 @@ class AdsB(CooperativeSensor):
         )
         counts &= sent_ns > oldest_ns[:, np.newaxis]
         roster = cells.roster
-        then = roster.equipped(cells.craft[asked][:, np.newaxis], sent_ns)
-        counts &= roster.equipage.ads_b[then]
-        counts &= sent_ns < roster.equipage.silent_after_s[then] * NANOSECONDS
+        craft = roster.equipped(cells.craft[asked][:, np.newaxis], sent_ns)
+        counts &= roster.equipage.ads_b[craft]
+        counts &= sent_ns < roster.equipage.silent_after_s[craft] * NANOSECONDS
         row, column = np.nonzero(counts)
         if not len(row):
             return none, none, none

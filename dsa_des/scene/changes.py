@@ -186,6 +186,7 @@ def _seconds(scene_file: SceneFile, key: Key, value: Any) -> Fraction | None:
 
 def _explain_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -> str:
     """Return why a key cannot change while a run lasts, and which could; nothing where it can."""
+    rest: list[str | int]
     first, name, *rest = (*key, "", "")
     if first == "blocks" and name in blocks:
         if (cls := blocks[name]) is None:
@@ -194,7 +195,7 @@ def _explain_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -
         of_tables, inside = _allowed_inside(cls.Parameters, key)
         allowed = may_change(BlockOptions) if len(inside) >= len(key) else ()
         if cls.remembers is not None or cls.heeds_changes:
-            allowed, rest = allowed + of_tables, [*inside]
+            allowed, rest = allowed + of_tables, list(inside)
         elif inside[0] in of_tables:
             return (
                 f"cannot change while a run lasts: {cls.path()} does not say what it remembers "
