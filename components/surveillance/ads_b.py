@@ -237,8 +237,7 @@ class AdsB(CooperativeSensor):
         """Receive what was sent up to each scan, and decode the last of it."""
         extras = empty_report_columns(len(cells))
         moves = np.full((3, len(cells)), np.nan)
-        equipage = cells.roster.equipage
-        sends = np.flatnonzero(equipage.ads_b[cells.craft])
+        sends = np.flatnonzero(cells.roster.ever_broadcasts[cells.craft])
         reported, number, sent_ns = self._last_received("position", cells, sends)
         detected = np.zeros(len(cells), dtype=bool)
         detected[reported] = True
@@ -250,7 +249,7 @@ class AdsB(CooperativeSensor):
             detected = self.of_others(cells, detected, extras["address"])
         signal = {f"own_{axis}": moves[i] for i, axis in enumerate(("north", "east", "down"))}
         self._rows = cells.row, moves
-        confidence = np.where(detected, equipage.nacp[cells.craft], 0.0)
+        confidence = np.where(detected, extras["nacp"], 0.0)
         return Look(detected, confidence, extras, signal=signal)
 
     def _last_received(
@@ -268,8 +267,10 @@ class AdsB(CooperativeSensor):
             senders.keys, senders.run, now_ns, count
         )
         counts &= sent_ns > oldest_ns[:, np.newaxis]
-        silent_after_s = cells.roster.equipage.silent_after_s[senders.craft]
-        counts &= sent_ns < (silent_after_s * NANOSECONDS)[:, np.newaxis]
+        roster = cells.roster
+        craft = roster.equipped(cells.craft[asked][:, np.newaxis], sent_ns)
+        counts &= roster.equipage.ads_b[craft]
+        counts &= sent_ns < roster.equipage.silent_after_s[craft] * NANOSECONDS
         row, column = np.nonzero(counts)
         if not len(row):
             return none, none, none
@@ -302,25 +303,24 @@ class AdsB(CooperativeSensor):
         extras: dict[str, AnyArray],
     ) -> None:
         """Fill in what was decoded of some cells."""
-        equipage, craft = cells.roster.equipage, cells.craft
+        equipage, senders = cells.roster.equipage, Transponders.from_cells(cells, reported, sent_ns)
         sent = self._states_when_sent(cells, reported, number, sent_ns)
-        position = self._broadcasts.position(
-            equipage, Transponders.from_cells(cells, reported), sent
-        )
+        position = self._broadcasts.position(equipage, senders, sent)
         for name, values in zip(POSITION_FIELDS, position, strict=True):
             extras[f"reported_{name}"][reported] = values
         extras["reported_s"][reported] = sent_ns / NANOSECONDS
         for name in ("address", "nacp", "nic"):
-            extras[name][reported] = getattr(equipage, name)[craft[reported]]
+            extras[name][reported] = getattr(equipage, name)[senders.craft]
         moving, number, sent_ns = self._last_received("velocity", cells, reported)
         if not len(moving):
             return
+        senders = Transponders.from_cells(cells, moving, sent_ns)
         sent = self._states_when_sent(cells, moving, number, sent_ns)
-        velocity = self._broadcasts.velocity(equipage, Transponders.from_cells(cells, moving), sent)
+        velocity = self._broadcasts.velocity(equipage, senders, sent)
         for axis, values in zip(("north", "east", "climb"), velocity, strict=True):
             extras[f"reported_{axis}_m_s"][moving] = values
         extras["velocity_s"][moving] = sent_ns / NANOSECONDS
-        extras["nacv"][moving] = equipage.nacv[craft[moving]]
+        extras["nacv"][moving] = equipage.nacv[senders.craft]
 
     def _states_when_sent(
         self, cells: Cells, which: IntArray, number: IntArray, sent_ns: IntArray
@@ -329,7 +329,8 @@ class AdsB(CooperativeSensor):
 
         Before a flight begins its aircraft flew on towards there as it is when the message is sent.
         """
-        latency_s = cells.roster.equipage.latency_s[cells.craft[which]]
+        roster = cells.roster
+        latency_s = roster.equipage.latency_s[roster.equipped(cells.craft[which], sent_ns)]
         instant_ns = sent_ns - np.rint(latency_s * NANOSECONDS).astype(np.int64)
         ahead_s = (instant_ns - cells.state_ns[which]) / NANOSECONDS
         back_s = np.zeros(len(which))
@@ -375,8 +376,10 @@ class AdsB(CooperativeSensor):
         ahead = relative_ned(own, *displaced_position(*position, *(carried * (age_s + STEP_S))))
         moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / STEP_S)
         azimuth, elevation, distance = ned_to_body_angles(own, ned)
+        sent_ns = np.rint(said["reported_s"] * NANOSECONDS).astype(np.int64)
+        roster = cells.roster
         stated = StatedByAircraft(
-            cells.roster.equipage, cells.craft[detected], said,
+            roster.equipage, roster.equipped(cells.craft[detected], sent_ns), said,
             errs=self.p.position_errors != "none", rounds=self.p.compact,
             pressure_deviation_m=self.p.pressure_deviation_m,
         )  # fmt: skip

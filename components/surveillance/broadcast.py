@@ -36,17 +36,22 @@ _OWNER = "[equipage]"
 
 @dataclass(frozen=True)
 class Transponders:
-    """Of some aircraft, (n,): draw keys, runs and indices among the roster's aircraft."""
+    """Of some aircraft, (n,): draw keys, runs and indices in the roster's equipage."""
 
     keys: npt.NDArray[np.uint64]
     run: IntArray
     craft: IntArray
 
     @classmethod
-    def from_cells(cls, cells: Cells, which: IntArray) -> Transponders:
-        """Return those of some cells' targets."""
+    def from_cells(
+        cls, cells: Cells, which: IntArray, instant_ns: IntArray | None = None
+    ) -> Transponders:
+        """Return those of some cells' targets, by default as they are at the look."""
         keys = cells.roster.keys_of(cells.target[which])
-        return cls(keys, cells.run[which], cells.craft[which])
+        craft = cells.equipped[which]
+        if instant_ns is not None:
+            craft = cells.roster.equipped(cells.craft[which], instant_ns)
+        return cls(keys, cells.run[which], craft)
 
 
 class Altimeters:

@@ -52,7 +52,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
-from dsa_des.time.clock import ClockSpec
+from dsa_des.time.clock import NANOSECONDS, ClockSpec
 
 
 class SourceParameters(Parameters):
@@ -90,6 +90,7 @@ class TrafficSource(Component):
     windowed = True
     rewindable = True
     clocked = "demand"
+    heeds_changes = True
     hooks = (ATTITUDE,)
 
     own: Trajectory
@@ -159,6 +160,11 @@ class TrafficSource(Component):
             # In wind a nose may point anywhere.
             return replace(envelope, pitch_rad=0.5 * math.pi, roll_rad=math.pi)
         return envelope
+
+    def heed_change(self, from_s: Fraction, other: Any) -> None:
+        """Carry from an instant on what another instance does; all else of aircraft stays."""
+        later = (*self.roster.later, (round(from_s * NANOSECONDS), other.roster))
+        self.roster = replace(self.roster, later=later)
 
     def setup(self) -> None:
         """Learn who looks and is steered, and how far sensors look; what is beyond is not moved."""
@@ -237,7 +243,8 @@ class TrafficSource(Component):
         # What [accuracy] leaves out may rest on what the targets are.
         accuracy = self.context.sections.get("accuracy")
         allows = accuracy is not None and accuracy.model_dump(exclude_none=True)
-        if flights is None or (allows and flights.roster is not self.roster):
+        fixed = allows or self.roster.later
+        if flights is None or (fixed and flights.roster is not self.roster):
             return None
         # A flight into the ground is said of its own replica, by itself.
         for number in range(len(parameters)):

@@ -34,11 +34,10 @@ def flown(traffic, duration_s=20, **more):
         **more,
     }  # fmt: skip
     simulation, tables = tables_of(dsa_des.load_scene(scene))
-    truth = tables["truth"].to_pandas()
-    heights = {
-        name: rows.alt_m.to_numpy() for name, rows in truth.groupby(truth.target.fillna("own"))
-    }
-    return simulation, heights
+    heights = {}
+    for row in tables["truth"].to_pylist():
+        heights.setdefault(row["target"] or "own", []).append(row["alt_m"])
+    return simulation, {name: np.array(values) for name, values in heights.items()}
 
 
 def at(lat_deg, **of):
