@@ -1,4 +1,4 @@
-"""A measurement that comes late, in one step: what the state now has to do with the state then.
+"""Late measurements in one step, by the correlation of the present state with the earlier one.
 
 With the state before the measurement's own instant and the state now, the measurements between the
 two stand for one of the state now. So the state then follows by one step of smoothing, is corrected

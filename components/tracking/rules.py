@@ -63,7 +63,9 @@ class LastingErrors:
 
     @cached_property
     def is_correlated(self) -> BoolArray:
-        """Whether any error of each sensor is correlated; last False, for no sensor (-1)."""
+        """Whether any error of each sensor is correlated; the last one, of no sensor (-1), is
+        False.
+        """
         parts = (self.variance != 0.0) | (self.across_m2 != 0.0) | (self.share != 0.0)
         return np.append((self.step != 0.0).any(axis=0) | parts.any(axis=(0, 1)), False)
 

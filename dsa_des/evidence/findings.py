@@ -1,4 +1,4 @@
-"""What the studies of a case come to: requirement by requirement, and how sure that is."""
+"""The verdicts of a case by requirement, with their confidence."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -108,7 +108,7 @@ class GaussMarkov:
     def _values_after_branches(
         self, branches: int, who: Any, instants: IntArray, first: int, runs: IntArray
     ) -> FloatArray:
-        """Return the values of runs that went on by the first so many of their branches."""
+        """Return the values of runs after the first so many of their branches."""
         if not branches:
             return self._draw(self._stream.of_runs(runs), who, instants, first)
         begin = self._stream.of_branches(runs, branches)[0]
