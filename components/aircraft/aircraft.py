@@ -271,7 +271,7 @@ class Roster:
     @cached_property
     def ever_broadcasts(self) -> BoolArray:
         """Which aircraft send ADS-B at some time, shape (targets,)."""
-        return np.asarray(self.equipage.ads_b.reshape(-1, len(self.aircraft)).any(axis=0))
+        return np.asarray(self.equipage.ads_b.reshape(1 + len(self.later), -1).any(axis=0))
 
     @cached_property
     def engines(self) -> AnyArray:

@@ -91,6 +91,14 @@ class AdsBParameters(CooperativeParameters):
         description="Whether values are rounded as in the messages: compact positions, 25 ft, "
         "whole knots, 64 ft/min.",
     )
+    heights: Literal["reported", "by_own_altimeter", "geometric"] = Field(  # type: ignore[assignment]
+        default="reported",
+        description="What reported pressure altitudes are taken for: 'reported', heights as they "
+        "are; 'by_own_altimeter', heights once the difference between the ownship's own pressure "
+        "altitude and its height by navigation is taken off. 'geometric': the heights above the "
+        "ellipsoid that aircraft send with their velocities are taken in their place (ads_b.gva); "
+        "who sends none is not placed.",
+    )
     velocity_age_s: float = Field(
         default=3.0, ge=0.5, le=LONGEST_S,
         description="Oldest velocity message that goes with a position, s.",
@@ -112,6 +120,8 @@ class AdsBParameters(CooperativeParameters):
         if self.reception != "fitted":
             around = "aircraft_around", "airports_around"
             said += self.idle(*around, because=f"reception is {self.reception!r}")
+        if self.heights == "geometric":
+            said += self.idle("pressure_deviation_m", because="heights is 'geometric'")
         return said
 
     def reach(self) -> Reach:
@@ -204,11 +214,16 @@ class AdsB(CooperativeSensor):
         self._received = {kind: self.stream(f"{kind} received") for kind in self._clocks}
         self._broadcasts = Broadcasts(streams, parameters.position_errors, parameters.compact)
 
+    @property
+    def _is_geometric(self) -> bool:
+        return bool(self.p.heights == "geometric")
+
     def offer(self, port: str) -> Any:
         """Say that all variances differ from report to report."""
         offer: SensorOffer = super().offer(port)
         errs = self.p.position_errors != "none" or self.p.compact or self.p.pressure_deviation_m
-        told = errors_of_broadcast(self.p.position_errors) if errs else ()
+        model = self.p.position_errors, self._is_geometric
+        told = errors_of_broadcast(*model) if errs else ()
         # Of targets that may be anything some may be late.
         late = [(one.equipage.late_s > 0.0).any() for one in known_targets(self.context)]
         told = (*told, LATE) if any(late or [True]) else told
@@ -216,7 +231,7 @@ class AdsB(CooperativeSensor):
         return replace(
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
-            lasting=lasting_errors(self.p.position_errors), unstated_across_m2=0.0,
+            lasting=lasting_errors(*model), unstated_across_m2=0.0,
             promises=promises_of_looks(
                 float(1 / self.p.scan_rate_hz), promises_by_range(self.law, far_m)
             ),
@@ -243,7 +258,8 @@ class AdsB(CooperativeSensor):
         detected[reported] = True
         if len(reported):
             self._report(cells, reported, number, sent_ns, extras)
-            placed = self.has_position(cells, reported, extras["reported_alt_m"][reported])
+            taken = extras["reported_height_m" if self._is_geometric else "reported_alt_m"]
+            placed = self.has_position(cells, reported, taken[reported])
             detected[reported], reported = placed, reported[placed]
             moves[:, reported] = own_velocity(cells, reported)
             detected = self.of_others(cells, detected, extras["address"])
@@ -320,6 +336,8 @@ class AdsB(CooperativeSensor):
         for axis, values in zip(("north", "east", "climb"), velocity, strict=True):
             extras[f"reported_{axis}_m_s"][moving] = values
         extras["velocity_s"][moving] = sent_ns / NANOSECONDS
+        above_m = self._broadcasts.height_difference_m(equipage, senders, sent)
+        extras["reported_height_m"][moving] = extras["reported_alt_m"][moving] + above_m
         extras["nacv"][moving] = equipage.nacv[senders.craft]
 
     def _states_when_sent(
@@ -346,7 +364,8 @@ class AdsB(CooperativeSensor):
             position = [np.where(back_s > 0.0, b, p) for b, p in zip(before, position, strict=True)]
         velocity[2] = -velocity[2]
         lat, lon, height = position
-        return Sent(lat, lon, self.altimeter_m(height), velocity, number, instant_ns)
+        altitude = self.altimeter_m(height)
+        return Sent(lat, lon, altitude, height, velocity, number, instant_ns)
 
     def _measure(
         self,
@@ -366,7 +385,10 @@ class AdsB(CooperativeSensor):
         now_s = cells.state_ns[detected] / NANOSECONDS
         age_s = now_s - said["reported_s"]
         lat, lon, altitude = (said[f"reported_{name}"] for name in POSITION_FIELDS)
-        position = [lat, lon, self.heights_m(cells, detected, altitude)]
+        height = said["reported_height_m"]
+        if not self._is_geometric:
+            height = self.heights_m(cells, detected, altitude)
+        position = [lat, lon, height]
         velocity = rotate_velocity_to_later(
             position, velocity, said["reported_s"] - said["velocity_s"]
         )
@@ -381,7 +403,7 @@ class AdsB(CooperativeSensor):
         stated = StatedByAircraft(
             roster.equipage, roster.equipped(cells.craft[detected], sent_ns), said,
             errs=self.p.position_errors != "none", rounds=self.p.compact,
-            pressure_deviation_m=self.p.pressure_deviation_m,
+            pressure_deviation_m=self.p.pressure_deviation_m, is_geometric=self._is_geometric,
         )  # fmt: skip
         late_m = stated.late_s * np.nan_to_num(moving)
         variances = variances_in_body(own, ned, stated.position_m2(age_s), late_m)

@@ -28,8 +28,8 @@ STEP_S = 1.0 / 64.0
 
 #: What one who is heard lacks where no code has its altitude.
 NO_CODE = (
-    "those that it hears send no altitude (no code has one below -1,200 ft or above 126,700 ft), "
-    "and are not placed"
+    "those that it hears send no altitude that it takes (no code has one below -1,200 ft or above "
+    "126,700 ft), and are not placed"
 )
 
 #: Keys of sensors that measure lines of sight; a report that an aircraft makes has none of them.
@@ -39,6 +39,10 @@ _MEASURED_KEYS = (
     "azimuth_resolution_deg", "elevation_resolution_deg", "mount_azimuth_deg",
     "mount_elevation_deg", "mount_roll_deg", "misalignment_deg", "quantised", "biases",
 )  # fmt: skip
+
+
+def _as_read(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
 
 
 class CooperativeParameters(SensorParameters):
@@ -73,7 +77,7 @@ class CooperativeParameters(SensorParameters):
                 f"{key} is given: a cooperative sensor has no axes and no grid of its own; "
                 "leave it out"
                 for key in _MEASURED_KEYS
-                if key in given and given[key] != fields[key].default
+                if key in given and _as_read(given[key]) != fields[key].default
             ]
         )
         return given

@@ -116,6 +116,14 @@ def test_a_platform_of_its_own_hears_the_ownship_fail():
     assert not inside(time_s).any() and (time_s < 13).sum() > 15 and (time_s >= 27).sum() > 15
 
 
+@pytest.mark.parametrize("sensor", [ADS_B, TCAS])
+def test_where_nobody_else_flies_nobody_is_heard(sensor):
+    alone = {**scene(sensor).resolved()["blocks"]}
+    alone["traffic"] = {**alone["traffic"], "intruders": []}
+    _, tables = tables_of(scene(sensor, blocks=alone, duration_s=3))
+    assert tables["scans"].num_rows == 6 and tables["detections"].num_rows == 0
+
+
 def test_what_else_of_an_aircraft_cannot_change_is_said():
     for rest, said in (
         ("speed_mps", "can change others; allowed: ads_b, mode_c, mode_s"),

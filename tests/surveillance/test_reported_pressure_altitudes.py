@@ -101,6 +101,53 @@ def test_the_standard_atmosphere_says_and_changes_nothing():
     assert one["detections"].equals(other["detections"])
 
 
+def crowd(gva, **sensor):
+    """Return the reports of a hundred aircraft at 1200 m, in wrong air, after some seconds."""
+    crafts = [
+        {"name": f"c{k}", "lat_deg": 52.02 + 1e-3 * k, "lon_deg": 4.0, "alt_m": 1200,
+         "heading_deg": 90, "speed_mps": 70, "ads_b": {"nacp": 9, "gva": gva} if gva else {}}
+        for k in range(100)
+    ]  # fmt: skip
+    own = {"lat_deg": 52, "lon_deg": 4, "alt_m": 900, "heading_deg": 0, "speed_mps": 60}
+    traffic = {"type": "traffic.scripted", "ownship": own, "intruders": crafts}
+    of = {"type": "surveillance.ads_b", "reception": "certain", "heights": "geometric", **sensor}
+    simulation, tables = tables_of(scene(of, {**LOW, **WARM}, {"traffic": traffic}))
+    rows = tables["detections"].to_pydict()
+    last = np.array(rows["time_s"]) == max(rows["time_s"], default=0)
+    return simulation, {n: np.array(v)[last] for n, v in rows.items()}
+
+
+@covers("heights", "pressure_deviation_m", of=("surveillance.ads_b",))
+@covers("intruders.ads_b.gva", of=("traffic.scripted",))
+def test_the_geometric_heights_that_are_sent_beside_know_no_weather():
+    exact = {"position_errors": "none", "compact": False}
+    simulation, rows = crowd(2, **exact)
+    assert len(rows["target"]) == 100
+    assert rows["reported_alt_m"] == pytest.approx(altimeter_m(1200, **LOW, **WARM), abs=0.05)
+    assert rows["reported_height_m"] == pytest.approx(1200, abs=1e-6)
+    assert simulation.components["sensor"].warnings() == []
+    # Both are in steps of 25 ft, of which the height is the sum.
+    _, rows = crowd(2, position_errors="none")
+    assert (np.round(rows["reported_height_m"] / 7.62, 6) % 1 == 0).all()
+    assert np.abs(rows["reported_height_m"] - 1200).max() < 7.63
+    # With errors, 95 % within 45 or 150 m, and as large as is stated.
+    for gva, within_m in ((1, 150), (2, 45)):
+        _, rows = crowd(gva)
+        off_m = rows["reported_height_m"] - 1200
+        deviation = np.hypot(within_m / 1.96, np.sqrt(2 / 12) * 7.62)
+        low, high = chi2.ppf([0.001, 0.999], 100)
+        assert low < (off_m**2).sum() / deviation**2 < high
+        level = rows["range_m"] * np.cos(rows["elevation_rad"])
+        stated_m2 = rows["elevation_variance_rad2"] * level**2
+        assert low < (off_m**2 / stated_m2).sum() < high
+    # Who sends none is not placed.
+    simulation, rows = crowd(None)
+    assert len(rows["target"]) == 0
+    (counts,) = [n for what, n in simulation.components["sensor"].undone().items()
+                 if "no altitude that it takes" in what]  # fmt: skip
+    assert counts[0].sum() > 300
+
+
 RADAR = {"type": "radar.range_boundary", "scan_rate_hz": 1, "range_km": 15, "errors": "stated",
          "azimuth_error_deg": 0.3, "elevation_error_deg": 0.3, "range_error_m": 15,
          "azimuth_resolution_deg": 0.1, "elevation_resolution_deg": 0.1,
