@@ -253,7 +253,7 @@ class Recorder:
         del self._groups[mark:]
 
     def advance(self, run: int, tick: int) -> None:
-        """Pass on the rows before a tick of a run, none of which will follow, once there are enough."""
+        """Pass on the rows before a tick of a run, once there are enough; no more will come."""
         if self._noted[0] >= _ROWS_AT_ONCE or self._noted[1] >= _PIECES_AT_ONCE:
             self._flush_before(run, tick)
 
