@@ -12,7 +12,7 @@ from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.false_detections import sort_by_measurement
 from components.messages.targets import RelativeTargets
 from components.radar.detection.clutter import clutter_detection_probability
-from components.radar.detection.output import false_alarm_count, false_alarm_snr
+from components.radar.detection.detector_output import false_alarm_count, false_alarm_snr
 from components.radar.detection.threshold import Crossing
 from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS, Clutter, terrain_of
 from components.radar.measurement import FAINTEST
