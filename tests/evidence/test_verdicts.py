@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from dsa_des.evidence.case import CaseRequirement
-from dsa_des.evidence.findings import Convergence, Finding, running_counts, first_line
+from dsa_des.evidence.findings import Convergence, Finding, first_line, running_counts
 from dsa_des.results.statistics import Estimate
 
 
