@@ -343,7 +343,7 @@ class TurnAway(Component):
         self._rangeless = NO_COUNTS
 
     def warnings(self) -> list[str]:
-        """Say that nobody measures the range by which it goes."""
+        """Warn that no sensor measures the range that it needs."""
         blind = "" if self.p.without_range else without_range(self.context.producers)
         if not blind:
             return []
@@ -382,7 +382,7 @@ class TurnAway(Component):
         return Manoeuvres.at_rows(wake.instants, manoeuvres)
 
     def _turn(self, *, on_the_left: bool) -> Manoeuvre:
-        """Return the turn for somebody on a side."""
+        """Return the turn away from an aircraft on one side."""
         to_the_right = {"away": on_the_left, "towards": not on_the_left}
         right = to_the_right.get(self.p.direction, self.p.direction == "right")
         bank_deg = self.p.bank_deg or 0.0

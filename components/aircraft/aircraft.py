@@ -262,7 +262,7 @@ class Roster:
         return Equipage.from_aircraft(every, np.tile(self.keys, len(every) // max(1, len(self))))
 
     def equipped(self, craft: IntArray, instant_ns: IntArray) -> IntArray:
-        """Return where in `equipage` some of the aircraft stand at instants of the run."""
+        """Return the rows of `equipage` for some of the aircraft at instants of the run."""
         if not self.later:
             return craft
         begins_ns = [from_ns for from_ns, _ in self.later]

@@ -160,7 +160,7 @@ class SessionControl:
         return self._pauses and self._operators == 0
 
     def show_time(self, time_s: float, lag_s: float) -> None:
-        """Take note of how far the run has come, and show it."""
+        """Note the simulated time that the run has reached, and show it."""
         self._now = time_s, lag_s, None if self.scope is None else self.scope.take_received()
         if self._gone_at is not None:
             self.holds()
@@ -178,8 +178,9 @@ class SessionControl:
         return f"{taken} decision{'' if taken == 1 else 's'} taken in, up to {self._now[0]:.1f} s"
 
     def _decision_fields(self, message: Judged | Turned | Climbed, taken: Taken) -> dict[str, Any]:
-        """Return what pages are told of a decision that was taken in: of its time, s, the alert's
-        level, where a command leads to, until when, and what it replaces."""
+        """Return the fields that pages receive of an accepted decision: its time, s, the alert's
+        level, the commanded value, until when it is flown, and which command it replaces.
+        """
         assert self.scope is not None
         answer: dict[str, Any] = {
             "time": round(taken.time_s, 6), "level": self.scope.level_of(message.target)
@@ -285,7 +286,7 @@ class SessionControl:
             await page.send({"type": "refused", "id": message.id, "why": why})
 
     def _submit(self, message: Judged | Turned | Climbed, name: str) -> bool:
-        """Hand a decision to the simulation; the page learns when it was taken in."""
+        """Pass a decision to the simulation; the page is informed once it is accepted."""
         kind = KINDS.index(message.decision)
         value = getattr(message, "value", 0.0)
         decision = OperatorDecision(

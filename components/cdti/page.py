@@ -136,7 +136,7 @@ class Judged(_Decided):
 
 
 class Turned(_Decided):
-    """The ownship is told to turn, deg to the right."""
+    """A command to the ownship to turn, deg to the right."""
 
     decision: Literal["turn"]
     target: int = Field(ge=-1, le=10**7)
@@ -144,7 +144,7 @@ class Turned(_Decided):
 
 
 class Climbed(_Decided):
-    """The ownship is told to climb, m upward."""
+    """A command to the ownship to climb, m upward."""
 
     decision: Literal["climb"]
     target: int = Field(ge=-1, le=10**7)

@@ -1,4 +1,4 @@
-"""What the display shows: listens to a run's messages, and tells how things are at an instant.
+"""The content of the display: it receives a run's messages, and gives the picture at an instant.
 
 The thread of the simulation calls `listen`; any other may call `picture`. What they share is
 replaced as a whole, never changed.

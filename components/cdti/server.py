@@ -307,11 +307,11 @@ class ConnectionLimit:
         return True
 
     def count_closed(self) -> None:
-        """Count a connection that was taken and is gone."""
+        """Count an accepted connection that has ended."""
         self._open -= 1
 
     def on_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """Handle what the loop could not: connections may come faster than they can be dropped."""
+        """Handle errors of the event loop: connections may come faster than they can be dropped."""
         error = context.get("exception")
         if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
             self._starved = True

@@ -20,7 +20,7 @@ _MANOEUVRE: dict[str, Any] = {
 
 @dataclass
 class Alerted:
-    """When which target was alerted to at which level, and when who was told to fly otherwise."""
+    """Alerts by target, level and time, and the times of commanded manoeuvres."""
 
     #: Target → level, and from when to when, s; of several alerting blocks the highest counts.
     stretches: dict[str, list[tuple[int, float, float]]] = field(default_factory=dict)
@@ -41,7 +41,7 @@ class Alerted:
 
     @property
     def manoeuvres_s(self) -> FloatArray:
-        """When any were told, s."""
+        """Times of all commanded manoeuvres, s."""
         return np.unique(np.concatenate([np.empty(0), *self.manoeuvres.values()]))
 
     @property
@@ -135,6 +135,6 @@ def draw_alerted_lines(
 
 
 def draw_manoeuvres(axes: Any, x: FloatArray, y: FloatArray) -> None:
-    """Mark where, or when, an aircraft was told to fly otherwise."""
+    """Mark where, or when, an aircraft was commanded a manoeuvre."""
     if len(x):
         axes.plot(x, y, **_MANOEUVRE, zorder=3.2, scalex=False, scaley=False, clip_on=False)

@@ -199,7 +199,7 @@ class PlatformSummary:
 
 
 def select_platform(summary: Mapping[str, Any], platform: str) -> dict[str, Any]:
-    """Return of a summary's sections by block what is on a platform, and whom that comes near."""
+    """Return the sections of a summary that are of one platform: its blocks and approaches."""
     carried = summary["platforms"][platform]
     blocks = set(carried["blocks"])
     result: dict[str, Any] = {"targets": carried.get("targets", summary.get("targets"))}

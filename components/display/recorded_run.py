@@ -156,7 +156,7 @@ class RecordedTables:
                 )
 
     def numbers(self, table: str, name: str) -> FloatArray:
-        """Return a column as numbers, NaN where nothing stands; refuse any other."""
+        """Return a column as numbers, NaN where it is null; refuse one that is not numeric."""
         try:
             column = self._column(table, name).to_numpy(zero_copy_only=False)
             return np.asarray(column, dtype=np.float64)

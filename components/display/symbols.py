@@ -216,7 +216,7 @@ def targets_key(dense: bool) -> Any:
 
 
 def set_time_axis(axes: Any, start_s: float, end_s: float, what: str) -> None:
-    """Give axes a time from start to end, what stands on the other, and a grid."""
+    """Give axes a time from start to end, a label of the other axis, and a grid."""
     axes.set_xlim(start_s, max(end_s, start_s + 1e-9))
     axes.set(xlabel="time (s)", ylabel=what)
     add_grid(axes)

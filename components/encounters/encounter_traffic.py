@@ -284,7 +284,7 @@ class ModelTraffic(_EncounterTraffic):
     )  # fmt: skip
 
     def warnings(self) -> list[str]:
-        """Say which units of the models were taken for others too."""
+        """Note which units of the models are interpreted."""
         models = dict.fromkeys((self.p.file, self.p.intruder_file or self.p.file))
         notes = [f"file {path}: {note}" for path in models for note in read_model(path).notes]
         return notes + super().warnings()
@@ -335,7 +335,7 @@ def _move_set(encounter_set: EncounterSet, reference_deg: tuple[float, float]) -
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """What makes encounters of a model, and where their origin is put.
+    """The sampler of a model's encounters, and their origin.
 
     It is itself a key, of one object for all that are alike (`_model_of`).
     """

@@ -297,7 +297,7 @@ class RewindableProcess(Process):
 
 
 class _Current:
-    """What is so of the program itself, wherever the engine has taken the block back to."""
+    """State of the program itself, which does not go back when the engine rewinds the block."""
 
     state: bytes | None = None
     restarts = 0

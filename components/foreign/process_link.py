@@ -157,7 +157,7 @@ class ProcessLink:
         reader.add(content)
 
     def _read_stderr(self) -> bool:
-        """Take what it says on standard error; whether more may come."""
+        """Read its standard error; return whether more may follow."""
         with suppress(BlockingIOError):
             said = os.read(self._process.stderr.fileno(), _CHUNK)
             self._words += said

@@ -112,7 +112,7 @@ class Fusion(Component):
         }
 
     def undone(self) -> dict[str, IntArray]:
-        """Return in which runs it never put detections of two sensors together."""
+        """Return the runs in which it never fused detections of two sensors."""
         if not self.puts_together:
             return {}
         return self._tries.undone(
@@ -120,7 +120,7 @@ class Fusion(Component):
         )
 
     def window_s(self) -> Any:
-        """Return how old a detection may be and still be put together with a new one, s."""
+        """Return how old a detection may be to be fused with a new one, s."""
         raise TypeError(f"{type(self).__name__} states no window")
 
     def with_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
@@ -239,7 +239,7 @@ class Fusion(Component):
 
 
 def largest_delay_s(sensor: Producer) -> Fraction:
-    """Return how late a sensor's looks come at most: by its own saying, and on the wire."""
+    """Return the largest delay of a sensor's looks: its own latency, and the wire's."""
     own_s = sensor.offer.latest_s if isinstance(sensor.offer, SensorOffer) else None
     return sensor.latest_s + (own_s or Fraction(0))
 

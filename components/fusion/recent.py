@@ -15,7 +15,7 @@ from dsa_des.block.wake import Arrivals
 
 @dataclass(frozen=True, eq=False)
 class Recent:
-    """Rows of every sensor that what comes next may be put together with."""
+    """Recent rows of every sensor, with which later ones may still be fused."""
 
     seen: Mapping[str, Arrivals] = field(default_factory=dict)
     #: By sensor, which entries of its rows and of older ones fused rows were made of, and which

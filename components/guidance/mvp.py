@@ -182,7 +182,7 @@ class VoltagePotential(Component):
 
 
 def _dense(alerts: AlertLevels) -> tuple[Others, FloatArray, BoolArray]:
-    """Return others of each row by target, NaN where not heard, own velocities, and who is heard.
+    """Return the others' states at each row, NaN where unknown, own velocities, and who is known.
 
     Positions in alerts are the ownship's less the target's.
     """

@@ -20,7 +20,7 @@ from dsa_des.block.effect import Effect, Hook, Verdict
 
 
 class Hides(Protocol):
-    """Tells which targets something stands before."""
+    """Finds the targets that terrain or the Earth's limb hide."""
 
     def __call__(self, own: Any, other: Any, present: BoolArray, /) -> BoolArray:
         """Return which of the targets that are `present` are hidden, from states of both."""

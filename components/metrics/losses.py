@@ -1,4 +1,4 @@
-"""First losses of separation and closest approaches, and how somebody is met there.
+"""First losses of separation and closest approaches, and the geometry of the meeting.
 
 Results of many flights are those flight by flight, to the bit.
 """
@@ -351,7 +351,7 @@ def nearest_in_runs(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
 
 
 class _Nearest(NamedTuple):
-    """Runs in which somebody is met, and of each whose flight is nearest, and when."""
+    """Runs in which another aircraft is met, with the nearest one of each and its time."""
 
     runs: list[int]
     flights: IntArray

@@ -146,7 +146,7 @@ def _vertex(three: FloatArray) -> float:
 
 
 class Flow(NamedTuple):
-    """How far a spot has come between two pictures, pixels; all NaN where that is not told."""
+    """Displacement of a spot between two pictures, pixels; NaN where it is not measured."""
 
     x: float
     y: float

@@ -213,7 +213,7 @@ class Sweep:
     def illuminate(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
     ) -> LitTargets:
-        """Return the targets as the beam meets them, one row per scan.
+        """Return the targets at the instants at which the beam meets them, one row per scan.
 
         Those in a cue cone it meets as the scan begins, if the radar's beam visits such cones
         first.

@@ -116,7 +116,7 @@ class CooperativeSensor(Sensor):
         return np.asarray(self._air.pressure_altitude_m(height_m))
 
     def heights_m(self, cells: Cells, which: AnyArray, altitude_m: FloatArray) -> FloatArray:
-        """Return which heights reported pressure altitudes of some cells are taken for."""
+        """Return the heights that reported pressure altitudes of some cells are interpreted as."""
         if self.p.heights == "reported":
             return altitude_m
         own_m = self.altimeter_m(cells.of_row("own_alt_m")[which])
@@ -167,7 +167,7 @@ class CooperativeSensor(Sensor):
                 raise ValueError(f"leaves_out: there is no {name!r}{did_you_mean(name, names)}")
 
     def of_others(self, cells: Cells, heard: BoolArray, address: IntArray) -> BoolArray:
-        """Return which cells are heard that have no address of an aircraft that is left out."""
+        """Return which received cells are not of an aircraft that is left out by its address."""
         roster = cells.roster
         for name in self.p.leaves_out:
             craft = np.full(len(cells), roster.names.index(name))
@@ -176,7 +176,7 @@ class CooperativeSensor(Sensor):
         return heard
 
     def has_position(self, cells: Cells, heard: IntArray, altitude_m: FloatArray) -> BoolArray:
-        """Return which of the cells that were heard are placed: one without an altitude is not.
+        """Return which received cells have a position: one without an altitude has none.
 
         An altitude that no code has is not available (NaN).
         """

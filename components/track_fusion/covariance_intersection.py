@@ -164,7 +164,7 @@ class CovarianceIntersection(Component):
         self._tries = Tries()
 
     def undone(self) -> dict[str, IntArray]:
-        """Return in which runs it never put tracks of two trackers together."""
+        """Return the runs in which it never fused tracks of two trackers."""
         return self._tries.undone(
             "two trackers or more have tracks, and it never puts two of them together", of_two=True
         )

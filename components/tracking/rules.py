@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 from components.estimation.estimator import Estimator
 from components.messages.detections import SensorOffer
 from components.messages.reach import Reach
-from components.tracking.promises import LIVES_S, Promises
+from components.tracking.due_detections import LIVES_S, Promises
 from components.tracking.reported_errors import CarriedErrors
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
@@ -63,7 +63,9 @@ class LastingErrors:
 
     @cached_property
     def is_correlated(self) -> BoolArray:
-        """Whether any error of each sensor is correlated; last False, for no sensor (-1)."""
+        """Whether any error of each sensor is correlated; the last one, of no sensor (-1), is
+        False.
+        """
         parts = (self.variance != 0.0) | (self.across_m2 != 0.0) | (self.share != 0.0)
         return np.append((self.step != 0.0).any(axis=0) | parts.any(axis=(0, 1)), False)
 

@@ -139,7 +139,7 @@ class Seen:
             self.columns = np.unique(np.concatenate([columns, viewers, *others]))
 
     def present_for_ownship(self, there: BoolArray) -> tuple[BoolArray, IntArray | None]:
-        """Return which targets are present for the ownship, and how many are left out."""
+        """Return which targets the ownship may see at each row, and how many are left out."""
         return self._present_for(-1, there, self.own.present)
 
     def present_for_others(

@@ -293,7 +293,9 @@ def _angles_deg(own: FloatArray, other: FloatArray) -> FloatArray:
 def _enters(
     apart: FloatArray, moved: FloatArray, horizontal_m: float, vertical_m: float
 ) -> BoolArray:
-    """Return which straight ways from `apart` on, both (3, n), come inside a cylinder."""
+    """Return which straight relative displacements `moved` from `apart`, both (3, n), enter a
+    cylinder.
+    """
     begin, end, crosses = _interval_in_radius(apart, moved, horizontal_m)
     low, high = _interval_in_height(apart[2], moved[2], vertical_m)
     first = np.maximum(np.maximum(begin, low), 0.0)

@@ -104,7 +104,7 @@ def show_command(folder: str, no_figures: bool, as_json: bool) -> None:
 def require_empty_or_resumed(
     location: "Path | Callable[[], Path]", resume: bool, what: str
 ) -> None:
-    """Raise UsageError where a folder holds something that was not to be gone on with."""
+    """Raise UsageError where a folder is not empty and the command does not resume."""
     if isinstance(location, Path):
         check_place(location)
         if location.is_dir() and any(location.iterdir()) and not resume:

@@ -50,7 +50,7 @@ class Sink(Protocol):
         """Take rows of one table, in their final order."""
 
     def close(self) -> None:
-        """Take note that no more rows come."""
+        """Finish: no more rows will follow."""
 
 
 # Smaller pieces are kept as they come: to look at them costs more than they hold.

@@ -53,7 +53,7 @@ def with_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
 def counts_by_run(
     undone: Mapping[str, IntArray | tuple[int, int]], runs: int
 ) -> dict[str, IntArray]:
-    """Return what a block says (`Component.undone`) as counts of all runs."""
+    """Return a block's answer (`Component.undone`) as counts of all runs."""
     result: dict[str, IntArray] = {}
     for what, counts in undone.items():
         said = np.asarray(counts, dtype=np.int64).reshape(2, -1)

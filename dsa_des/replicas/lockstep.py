@@ -189,7 +189,7 @@ class Replicas(Timeline):
             raise NotInLockStep(f"block {face.name} gives some replica another duration")
 
     def rehearse(self) -> None:
-        """Make what each replica has for itself, and let it go.
+        """Build each replica's own instances once, to raise their errors, and drop them.
 
         `NotInLockStep` if that shows a reason not to run them together.
         """
@@ -223,7 +223,7 @@ class Replicas(Timeline):
     def clock_specs(
         self, name: str, component: Component, stretch: int | None = None
     ) -> list[ClockSpec]:
-        """Return what each replica says of a block's clock."""
+        """Return each replica's specification of a block's clock."""
         every: list[Any] = []
         known: dict[int, Any] = {}  # by the identity of parameters, which many replicas share
         for parameters in self._parameters_of(name, stretch):

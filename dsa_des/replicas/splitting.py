@@ -60,7 +60,7 @@ Fly = Callable[[Sequence[Replica], IntArray, Sequence[float]], FlownRuns]
 
 @dataclass(frozen=True)
 class Repeated:
-    """What a repetition came to: its estimate, what one run more that comes to the event adds."""
+    """Result of a repetition: its estimate, and what one more run with the event would add."""
 
     probability: float
     unseen: float
@@ -69,7 +69,7 @@ class Repeated:
 
 
 class _Repetition:
-    """The runs of a repetition's present stage, and what they stand for."""
+    """The runs of a repetition's present stage, with their weights."""
 
     def __init__(self, seed: int, roots: Sequence[Replica]) -> None:
         self._seed, self.runs = seed, list(roots)

@@ -1,4 +1,4 @@
-"""The tables of a study: ``summary.parquet``, and what stands beside it."""
+"""The tables of a study: ``summary.parquet`` and the others of its folder."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -203,7 +203,7 @@ def _values_at(axes: Sequence[str], items: Sequence[Any]) -> dict[str, list[Any]
 
 
 def _columns(items: Sequence[Any], /, **paths: str) -> dict[str, list[Any]]:
-    """Return columns of what stands at dotted paths in items; None behind what is None."""
+    """Return columns of the values at dotted paths in items; None behind what is None."""
     return {name: [_value_at(item, path) for item in items] for name, path in paths.items()}
 
 

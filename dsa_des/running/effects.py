@@ -101,7 +101,7 @@ def _build_effect(block: Component, effect: Effect[Any]) -> Any:
 def remaining_tolerance(
     planned: Sequence[Planned], tolerance: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return what is left of a tolerance after the bounds of all that it let go."""
+    """Return what is left of a tolerance after the bounds of all effects that were left out."""
     left = dict(tolerance)
     for item in planned:
         if item.verdict.simulated and not item.built:

@@ -94,7 +94,7 @@ class Node:
 
     @property
     def state_objects(self) -> list[object]:
-        """All whose attributes hold its state."""
+        """All objects whose attributes hold its state."""
         failing = [] if self.outages is None else [self.outages]
         if self.stretched is not None:
             return [*failing, *self.stretched.state_objects]

@@ -84,7 +84,7 @@ class RunningBlock(Protocol):
 
     @property
     def state_objects(self) -> Sequence[object]:
-        """All whose attributes hold its state."""
+        """All objects whose attributes hold its state."""
 
     @property
     def wires(self) -> Sequence[Channel]:
@@ -187,7 +187,7 @@ class Rewinder:
         self._feedback = [channel for name, channel in into if (channel.source, name) in cut_edges]
 
     def watch(self) -> None:
-        """Take note from now on of what comes back."""
+        """Record from now on what arrives over feedback wires."""
         for channel in self._feedback:
             channel.watch()
 

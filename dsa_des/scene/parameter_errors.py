@@ -155,7 +155,7 @@ def explain(
 
 
 def _names_meant(model: Any, item: Any) -> list[str]:
-    """Return the key of a table that an error speaks of, and of an unknown one what it may mean."""
+    """Return the key that an error is about, and the nearest known ones of an unknown key."""
     if not item["loc"]:
         return []
     name = str(item["loc"][0])

@@ -72,7 +72,7 @@ class Outages:
         return failed
 
     def sent(self, port: str, message: Message) -> Message:
-        """Return what comes out of the block's output in place of what it sends."""
+        """Return the message that leaves the block in place of the one that it sends."""
         for one, edges in zip(self._failing, self._edges, strict=True):
             for quantity, worth in one.stuck.items():
                 message = message.with_stuck_bit(

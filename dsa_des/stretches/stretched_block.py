@@ -33,7 +33,7 @@ class StretchedBlock:
 
     @property
     def state_objects(self) -> list[object]:
-        """All whose attributes hold the state of the block, this object among them."""
+        """All objects whose attributes hold the state of the block, this one among them."""
         each = {id(one): one for one in self._instances}.values()
         effects = [effect for one in each for effect in one.context.effects.values()]
         return [self, *each, *effects]

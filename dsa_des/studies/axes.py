@@ -60,7 +60,7 @@ def flatten_axes(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
-    """Return an axis from what a study says of it."""
+    """Return an axis from its entry in a study."""
     if isinstance(spec, list):
         values = spec
     elif not isinstance(spec, dict):

@@ -77,7 +77,7 @@ class ChangingClock:
         return np.where(earlier < 0, -1, self.ticks(np.maximum(earlier, 0)))
 
     def next_scan_bound(self, tick: int) -> int:
-        """Return a tick such that no scan that is not before `tick` is before it."""
+        """Return a lower bound of the ticks of all scans at or after `tick`."""
         return tick
 
     def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:

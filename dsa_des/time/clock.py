@@ -57,7 +57,7 @@ _TOO_LONG = f"must be a number that is a fraction of whole numbers of at most {_
 
 
 def _has_too_many_digits(text: str) -> bool:
-    """Tell, without expanding it, whether a text stands for a number of too many digits."""
+    """Return, without expanding it, whether a text is a number of too many digits."""
     exponent = _EXPONENT.search(text[-_LONGEST_TEXT:])
     return len(text) > _LONGEST_TEXT or (
         exponent is not None and abs(int(exponent[1])) > _LONGEST_TEXT
@@ -187,7 +187,7 @@ class ScanClock:
         return self.offset + scan * self._whole + (2 * scan * r + d) // (2 * d)
 
     def next_scan_bound(self, tick: int) -> int:
-        """Return a tick such that no scan that is not before `tick` is before it."""
+        """Return a lower bound of the ticks of all scans at or after `tick`."""
         return self._grid_tick(self.first_scan_at_or_after(tick - self._margin)) - self._margin
 
     def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:

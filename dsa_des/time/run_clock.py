@@ -75,7 +75,7 @@ class RunClock:
         return self._last[2]
 
     def next_scan_bound(self, tick: int) -> int:
-        """Return a tick, not before this one, before which no run has a scan from this one on."""
+        """Return a lower bound of the ticks of all runs' scans at or after `tick`."""
         if self._runs.count > 1 and not self._alike_at_once:
             return tick
         # Who asks goes on in time, and what was found holds up to there.

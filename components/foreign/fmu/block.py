@@ -95,7 +95,7 @@ class ForeignFmu(Component):
         return Reach((-math.pi, math.pi), (-0.5 * math.pi, 0.5 * math.pi), lasts_s=_LASTS_S)
 
     def offer(self, port: str) -> Any:
-        """Say what its signals are, what it detects, or pass on what the traffic says."""
+        """Offer its signals, its detections, or what the traffic offers."""
         if port == "detections":
             return self.p.wiring.detections.offer(self.p.clock_spec())
         if port == "signals":
@@ -361,7 +361,7 @@ class ForeignFmu(Component):
 
 
 class RewindableFmu(ForeignFmu):
-    """An FMU whose state can be saved: it looks ahead, and is taken back if something came."""
+    """An FMU whose state can be saved: it looks ahead, and is rewound if a message arrives."""
 
     rewindable = True
 

@@ -200,7 +200,7 @@ class DetectionOutputs:
         self, tick: IntArray, scan: IntArray, numbers: FloatArray, own: FloatArray | None,
         truth: FloatArray | None, roster: Roster,
     ) -> Detections:  # fmt: skip
-        """Return the looks; none that saw nothing from where nobody knows.
+        """Return the looks; none of a look without detection whose pose is unknown.
 
         Parameters
         ----------

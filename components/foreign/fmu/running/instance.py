@@ -225,7 +225,8 @@ class Instance:
     # -- clocks --------------------------------------------------------------------------------
 
     def _step_to(self, before: int, tick: int, per_s: int, raised: Any) -> bool:
-        """Step to an instant; clocks that tick on the way do so at their own; whether it got there.
+        """Step to an instant, letting clocks tick at their own on the way; return whether it got
+        there.
 
         Those that tick at the instant itself are left to whoever gives it its inputs there.
         """
@@ -242,7 +243,7 @@ class Instance:
     # -- going back ----------------------------------------------------------------------------
 
     def restore_slot(self, slot: int, freed: list[int]) -> None:
-        """Bring it back to a state in which it was saved; 0 is before it started."""
+        """Restore a saved state; 0 is the one before it started."""
         if slot != self.slot:
             if slot == 0:
                 self.fmu.reset()

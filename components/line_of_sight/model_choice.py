@@ -13,7 +13,7 @@ from dsa_des.block.component import Context
 
 
 def seeming_look(context: Context, earth: str, look: FarthestLook) -> FarthestLook:
-    """Return what a look by a model of the Earth asks of the traffic, which goes by true ranges."""
+    """Return a look's request in true ranges, given ranges by a model of the Earth."""
     if earth == REFERENCE[0] or look.range_m == 0.0 or not math.isfinite(look.range_m):
         return look
     if _known_traffic(context) is None:

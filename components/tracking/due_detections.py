@@ -166,7 +166,7 @@ class Silence:
 
     @cached_property
     def silent_instants(self) -> RunTicks:
-        """When they are."""
+        """The instants of silence."""
         return self.instants.take(self.rows)
 
     def silence_since_work(self, row: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
