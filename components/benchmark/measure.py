@@ -39,9 +39,9 @@ def _measure_alone(kind: str, name: str, quick: bool, repeats: int) -> dict[str,
 
         return rates.measure_rate(name, quick, repeats)
     if kind == "calls":
-        from components.benchmark import calls
+        from components.benchmark import call_times
 
-        return calls.measure_calls(300 if quick else 1800, repeats)
+        return call_times.measure_calls(300 if quick else 1800, repeats)
     from components.benchmark import pairs
 
     return pairs.measure_pairs(name, quick, repeats)

@@ -15,11 +15,11 @@ import numpy as np
 from components.alert_configuration.conf_file import read_conf
 from components.alerting.levels import due_levels, violation_times_s
 from components.benchmark.scenes import SCENES, replicas_of, scene_of, select_cases
-from components.benchmark.shares import shares_by_block
+from components.benchmark.time_shares import shares_by_block
 from components.benchmark.track_updates import LOOKS, plain_updates, stone_soup_updates, updates
 from components.examples import folder
 from components.guidance.bands import guidance_of_many
-from components.guidance.kinds import KINDS
+from components.guidance.manoeuvre_kinds import KINDS
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
 from dsa_des.record.recording import Recorder

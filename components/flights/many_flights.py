@@ -17,7 +17,7 @@ from components.flights.scripted_flights import MOST_ALT_M, ScriptedFleet, Scrip
 from components.flights.steering_plan import SteeredPart, chords, steered_parts, times_around_s
 from components.geometry import TrajectoryState, heading_from_deg, wrap_longitude_deg
 from components.messages.steering import Manoeuvre
-from dsa_des.arrays.growing import Growing
+from dsa_des.arrays.growing_arrays import Growing
 from dsa_des.arrays.types import FloatArray, IntArray
 
 

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from components.atmosphere.infrared import haze_share_at
 from components.atmosphere.visibility import KOSCHMIEDER
 from components.geometry import sector_width_rad, unit_vector
-from components.laser.link import (
+from components.laser.range_equation import (
     laser_power_w,
     scan_detection_probability,
     shots_on_target,
@@ -178,13 +178,14 @@ SHOTS = Ladder(
 class ScanningLaser(SweepingSensor):
     """A laser that scans a narrow field and ranges by time of flight.
 
-    Echoes follow the laser range equation (`components.laser.link`) for a target larger than the
-    beam, a small one and a wire; each aircraft's ``laser`` says what is hit. A shot's amplitude is
-    detected where with Gaussian noise it reaches the threshold of ``false_alarm_probability``; a
-    scan detects by ``hits_needed`` of the shots that its pattern puts on the target. ``snr_db`` is
-    20 lg of the strongest echo's amplitude over noise, confidence that over the threshold in dB.
-    With ``errors = "signal"`` range errs by pulse length over amplitude, and angles by anywhere in
-    the beam. Isolated false alarms are not reported: systems reject them pixel by pixel.
+    Echoes follow the laser range equation (`components.laser.range_equation`) for a target larger
+    than the beam, a small one and a wire; each aircraft's ``laser`` says what is hit. A shot's
+    amplitude is detected where with Gaussian noise it reaches the threshold of
+    ``false_alarm_probability``; a scan detects by ``hits_needed`` of the shots that its pattern
+    puts on the target. ``snr_db`` is 20 lg of the strongest echo's amplitude over noise, confidence
+    that over the threshold in dB. With ``errors = "signal"`` range errs by pulse length over
+    amplitude, and angles by anywhere in the beam. Isolated false alarms are not reported: systems
+    reject them pixel by pixel.
     """
 
     mark = LASER

@@ -13,15 +13,18 @@ import numpy as np
 from pydantic import Field
 
 from components.arguments.units import FOOT_M
-from components.metrics.censored import END, START, censoring_text, is_in_scan
 from components.metrics.detection import ANY, DECLARED, DeclarationParameters, declarations
 from components.metrics.flown_flights import FlownMetric, each_alone
 from components.metrics.losses import closest, losses_s
 from components.metrics.rows import (
+    END,
     SCANS,
+    START,
     PlatformParameters,
     TargetParameters,
+    censoring_text,
     earliest,
+    is_in_scan,
     is_named,
     sensors_of,
     values_of_target,

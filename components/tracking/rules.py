@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 from components.estimation.estimator import Estimator
 from components.messages.detections import SensorOffer
 from components.messages.reach import Reach
-from components.tracking.promises import LIVES_S, Promises
+from components.tracking.due_detections import LIVES_S, Promises
 from components.tracking.reported_errors import CarriedErrors
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters

@@ -15,6 +15,7 @@ from components.messages.fused import FusedDetections
 from components.messages.state_tracks import CONFIRMED, DELETED, StateTracks
 from components.sensor.marks import TRACKER
 from components.tracking.association import ASSOCIATIONS, Association
+from components.tracking.due_detections import ACTS_EVERY_S, Silence
 from components.tracking.ladder import LADDERS
 from components.tracking.out_of_sequence import (
     LookCount,
@@ -29,7 +30,6 @@ from components.tracking.out_of_sequence import (
     tracks_before,
     warning,
 )
-from components.tracking.promises import ACTS_EVERY_S, Silence
 from components.tracking.reported_errors import (
     coarse_bearings,
     errors_by_sensors,

@@ -8,7 +8,7 @@ from dsa_des.answers.alternatives import AS_IT_IS
 from dsa_des.answers.report import AnswerReport
 from dsa_des.answers.verdicts import ModelVerdict
 from dsa_des.block.mark import RED
-from dsa_des.costs.output import Label, put_labels
+from dsa_des.costs.cost_report import Label, put_labels
 from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts, plain_log_ticks
 from dsa_des.results.labels import unit_of
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from dsa_des.answers.alternatives import AS_IT_IS, COLUMN
 from dsa_des.answers.changes import PairedChange, confidence_of_each
-from dsa_des.answers.turns import TurnTimes
+from dsa_des.answers.models_in_turns import TurnTimes
 from dsa_des.answers.verdicts import (
     BEYOND,
     NOTHING,

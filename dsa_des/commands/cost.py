@@ -11,7 +11,7 @@ from dsa_des.block.foreign import NotImportable, load_named
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.block.registry import UnknownType, find
 from dsa_des.costs.climb import Comparison, RungCost, applies, climb, parse_budgets
-from dsa_des.costs.output import draw_costs, print_ladder, print_rest, write_table
+from dsa_des.costs.cost_report import draw_costs, print_ladder, print_rest, write_table
 from dsa_des.costs.replay import RungRun, run_watched
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import UsageError, did_you_mean

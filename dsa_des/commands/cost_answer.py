@@ -9,8 +9,8 @@ from typing import Any
 from dsa_des.answers.alternatives import Alternatives, comparable, find_alternatives, with_models
 from dsa_des.answers.changes import changes_by_model
 from dsa_des.answers.figure import draw_answers
+from dsa_des.answers.models_in_turns import Batch, TurnTimes, run_in_turns, turns_of
 from dsa_des.answers.report import AnswerReport, print_report
-from dsa_des.answers.turns import Batch, TurnTimes, run_in_turns, turns_of
 from dsa_des.answers.verdicts import BEYOND, NOTHING, OPEN, Limit, parse_limits
 from dsa_des.commands.cost import CostProgress
 from dsa_des.commands.study import (
@@ -21,7 +21,7 @@ from dsa_des.commands.study import (
     stop_with,
     target_of,
 )
-from dsa_des.costs.output import write_table
+from dsa_des.costs.cost_report import write_table
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
 from dsa_des.record.run_folder import write_run_json

@@ -21,7 +21,7 @@ from components.surveillance.reception import (
     do_365_reception_probability,
     time_to_receive_s,
 )
-from components.tracking.promises import Promises
+from components.tracking.due_detections import Promises
 from components.tracking.rules import LastingErrors
 from components.tracking.scans import Scans
 from dsa_des.running.simulation import Simulation

@@ -287,7 +287,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from dsa_des.commands.cost import comparison, ladders_to_climb
     from dsa_des.costs.chain import draw_chain, run_chain
     from dsa_des.costs.climb import RungCost, climb
-    from dsa_des.costs.output import draw_costs
+    from dsa_des.costs.cost_report import draw_costs
     from dsa_des.costs.variants import Variants
 
     compare = comparison()
