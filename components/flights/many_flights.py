@@ -17,7 +17,7 @@ from components.flights.scripted_flights import MOST_ALT_M, ScriptedFleet, Scrip
 from components.flights.steering_plan import SteeredPart, chords, steered_parts, times_around_s
 from components.geometry import TrajectoryState, heading_from_deg, wrap_longitude_deg
 from components.messages.steering import Manoeuvre
-from dsa_des.arrays.growing import Growing
+from dsa_des.arrays.growing_arrays import Growing
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -246,7 +246,7 @@ class SteeredFleet(Growing, Fleet):
         ramps = ~np.isnan(given[:, _VELOCITY[0]])
         if ramps.any():
             mine, others = ramps.nonzero()[0], (~ramps).nonzero()[0]
-            new = self._ramps(ownship[mine], time_s[mine], given[mine])
+            new = self._fly_ramps(ownship[mine], time_s[mine], given[mine])
             fleet = self._with_parts(ownship[mine], time_s[mine], new, [None] * len(mine))
             if not len(others):
                 return fleet
@@ -266,7 +266,7 @@ class SteeredFleet(Growing, Fleet):
         around = self.each(np.repeat(ownship, times_s.shape[1]), times_s.reshape(-1))
         return around.reshape(times_s.shape)
 
-    def _ramps(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> ScriptedFleet:
+    def _fly_ramps(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> ScriptedFleet:
         """Return what ownships fly from their velocities at times (n,) to commanded ones."""
         _, after, which = self._split_by_manoeuvre(ownship, time_s, None)
         velocity = np.full((2, len(time_s)), np.nan)

@@ -93,11 +93,11 @@ class Node:
         return self.component if self.stretched is None else self.stretched.now
 
     @property
-    def things(self) -> list[object]:
-        """All whose attributes hold its state."""
+    def state_objects(self) -> list[object]:
+        """All objects whose attributes hold its state."""
         failing = [] if self.outages is None else [self.outages]
         if self.stretched is not None:
-            return [*failing, *self.stretched.things]
+            return [*failing, *self.stretched.state_objects]
         return [*failing, self.component, *self.component.context.effects.values()]
 
     @property
@@ -213,7 +213,7 @@ class Node:
             clocks += [(demand.clock, demand.lead_ticks) for demand in self.demands]
         if self.pulse is not None:
             clocks.append((self.pulse, 0))
-        ticks = [clock.none_before(start + lead) - lead for clock, lead in clocks]
+        ticks = [clock.next_scan_bound(start + lead) - lead for clock, lead in clocks]
         ticks += [wire.quiet_until() for wire in self._trigger_wires]
         return max(start, min(ticks, default=MAX_TICK))
 
@@ -244,7 +244,7 @@ class Node:
             for wire in self._trigger_wires:
                 wire.collect(tick + 1)  # what came to be worked on now is left out with it
             return
-        self._run(_now(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
+        self._run(_instant_of(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
 
     def _run_window(self, start: int, end: int) -> None:
         if self.clock is not None:
@@ -287,7 +287,7 @@ class Node:
     def _run(
         self, instants: RunTicks, scans: IntArray, end: int, idle: BoolArray | None = None
     ) -> None:
-        before = None if self.clock is None else self.clock.before
+        before = None if self.clock is None else self.clock.previous_ticks
         if self.outages is not None and not (up := self.outages.is_up(instants)).all():
             instants, scans = instants.take(up), scans[up]
             idle = None if idle is None else idle[up]
@@ -337,7 +337,7 @@ class Node:
         self._missed = False
         tick = int(self.simulation.env.now)
         scans = np.array([-1], dtype=np.int64)
-        wake = self._inputs.wake_at(_now(tick), scans, tick + 1, complete=False)
+        wake = self._inputs.wake_at(_instant_of(tick), scans, tick + 1, complete=False)
         assert wake is not None
         return wake
 
@@ -395,5 +395,5 @@ def _no_scan_numbers(rows: int) -> IntArray:
     return _NO_SCAN[:rows]
 
 
-def _now(tick: int) -> RunTicks:
+def _instant_of(tick: int) -> RunTicks:
     return RunTicks(runs_of_single(1), np.array([tick], dtype=np.int64))
