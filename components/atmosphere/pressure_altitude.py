@@ -1,8 +1,8 @@
 """Pressure altitude and height: what altimeters read at a height in air that is not the standard's.
 
 The air is hydrostatic and dry, and the same over all of a scene. Heights count as geopotential
-ones, from which they differ by 1.4 m at 3 km; so in the standard atmosphere, where sea level lies
-on the ellipsoid, altitude and height are the same number, to the bit. ICAO, "Manual of the ICAO
+ones, from which they differ by 1.4 m at 3 km. A scene of the standard's, where sea level lies on
+the ellipsoid, has no `Air`: altitude and height are the same number. ICAO, "Manual of the ICAO
 standard atmosphere", Doc 7488.
 """
 
@@ -54,20 +54,12 @@ class Air:
     def pressure_altitude_m(self, height_m: ArrayLike) -> Any:
         """Return what altimeters read at heights from -5 to 30 km, m."""
         height = check_within("height_m", height_m, LOWEST_M, HIGHEST_M, "m") - self.geoid_m
-        if self._is_standard:
-            return height
         return _STANDARD.height_m(self._column.drop(height) - self._excess)
 
     def height_m(self, altitude_m: ArrayLike) -> Any:
         """Return the heights at which altimeters read some altitudes, m; its inverse."""
         altitude = check_within("altitude_m", altitude_m, LOWEST_M, HIGHEST_M, "m")
-        if self._is_standard:
-            return altitude + self.geoid_m
         return self._column.height_m(_STANDARD.drop(altitude) + self._excess) + self.geoid_m
-
-    @property
-    def _is_standard(self) -> bool:
-        return Air(geoid_m=self.geoid_m) == self
 
     @property
     def _excess(self) -> float:

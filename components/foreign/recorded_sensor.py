@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import known_targets
+from components.atmosphere.pressure_altitude import scene_air
 from components.foreign.reported_look import reported_looks
 from components.formats.measurement_file import Measurements, read_measurements
 from components.formats.recorded.known_kinds import captured_asterix
@@ -266,4 +267,6 @@ class RecordedSensor(Component):
         )
         total = len(self._tick)
         lines = [f"file: {note}" for note in self._read_measurements.notes]
+        if self.p.file.suffix in _RADARS and scene_air(self.context.sections) is not None:
+            lines.append("file: elevations are those of its flight levels, taken for heights")
         return lines + ([f"file: {late} of {total} looks come after the end"] if late else [])

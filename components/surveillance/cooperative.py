@@ -124,15 +124,19 @@ class CooperativeSensor(Sensor):
 
     def _note_pressure_heights(self) -> list[str]:
         """Say by how much pressure altitudes are off where they are taken for heights."""
-        if self._air is None or self.p.heights != "reported":
+        if self._air is None or self.p.heights == "geometric":
             return []
-        low_m, high_m = self.altimeter_m(np.array([0.0, 3000.0])) - np.array([0.0, 3000.0])
-        stated = self.p.pressure_deviation_m
-        said = f"stated with a deviation of {stated:g} m" if stated else "nobody is told"
+        at_m = np.array([0.0, 1000.0, 1300.0, 3000.0])
+        low_m, here_m, above_m, high_m = self.altimeter_m(at_m) - at_m
+        stated, left_m = self.p.pressure_deviation_m, above_m - here_m
+        told = f"stated with a deviation of {stated:g} m" if stated else "nobody is told"
+        if self.p.heights == "by_own_altimeter":
+            said = f"300 m above the ownship {left_m:+.0f} m are left, and {told}"
+            return [f"heights is 'by_own_altimeter': {said}"] if abs(left_m) > 5.0 else []
         return [
             f"heights is 'reported': pressure altitudes, off by {low_m:+.0f} m at 0 m and "
             f"{high_m:+.0f} m at 3,000 m in the air of [weather] (qnh_hpa, temperature_offset_c), "
-            f"are compared with heights as if they were such, and {said}; 'by_own_altimeter' takes "
+            f"are compared with heights as if they were such, and {told}; 'by_own_altimeter' takes "
             "that off"
         ]
 

@@ -15,7 +15,7 @@ class Heights(Parameters):
         default="geometric",
         description="What its altitudes are: heights above the ellipsoid; above mean sea level "
         "(`[terrain] geoid_undulation_m`); or pressure altitudes and flight levels, which are "
-        "flown where the air of `[weather]` has these pressures.",
+        "flown where the air of `[weather]` has these pressures at the start.",
     )
 
     def height_m(self, air: Air | None, altitude_m: Any) -> Any:

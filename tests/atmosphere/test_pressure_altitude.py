@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from components.atmosphere.pressure_altitude import Air
+from components.atmosphere.pressure_altitude import Air, scene_air
+from components.environment.tables import Terrain, Weather
 
 #: ICAO Doc 7488: geopotential altitude, m, and pressure, hPa.
 ICAO = [(0, 1013.25), (1000, 898.745), (3000, 701.085), (5000, 540.199), (8000, 355.998),
@@ -63,11 +64,12 @@ def test_one_row_of_a_profile_is_an_offset_and_the_standards_own_rows_are_no_cha
     assert Air(profile_c=rows).pressure_altitude_m(heights) == pytest.approx(heights, abs=1e-8)
 
 
-def test_the_standard_atmosphere_changes_no_bit():
+def test_the_standard_atmosphere_is_no_air_of_a_scene():
     heights = np.array([0.1, 123.456, 7891.234, 14_000.7])
-    assert (Air().pressure_altitude_m(heights) == heights).all()
-    assert (Air().height_m(heights) == heights).all()
-    assert (Air(geoid_m=30.0).height_m(heights) == heights + 30.0).all()
+    assert Air(geoid_m=30.0).height_m(heights) == pytest.approx(heights + 30.0, abs=1e-8)
+    assert Air(geoid_m=30.0).pressure_altitude_m(heights) == pytest.approx(heights - 30.0, abs=1e-8)
+    assert scene_air({}) is scene_air({"weather": Weather(), "terrain": Terrain()}) is None
+    assert scene_air({"weather": Weather(qnh_hpa=993)}) == Air(993)
 
 
 def test_heights_are_refused_where_they_are_wrong():
