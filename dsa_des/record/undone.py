@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from dsa_des.arrays.run_ticks import is_single_run
 from dsa_des.arrays.types import BoolArray, IntArray
 
 #: By block and by what its work lacked: how many times, of how many.
@@ -97,6 +98,9 @@ class Tries:
         The cases of each run stand together.
         """
         if not len(run):
+            return self
+        known = self.had[0] if is_single_run(run) and self.did.all() and len(self.did) else 0
+        if known and np.bitwise_or.reduce(had) | known == known:  # as most often
             return self
         first = np.flatnonzero(np.append(True, run[1:] != run[:-1]))
         mine = run[first]
