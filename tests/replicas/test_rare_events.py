@@ -244,8 +244,9 @@ def test_distances_part_runs_that_may_still_turn(tmp_path):
         # Nobody ever turns: the event is sure, and no stage is needed.
         (1, {}, ["nmac 1 1 to 1", "nmac.collapsed 0.00"]),
         # Who has come to 1,200 m was told to turn long before: distances show it too late.
-        (0.5, {"score": "separation"}, ["none of its 4 runs gave a result", "a score of 8 none comes "
-         "nearer to the event, whatever is drawn from then on; take another splitting.score, more"]),
+        (0.5, {"score": "separation"}, ["none of its 4 runs gave a result", "a score of 8 none "
+         "comes nearer to the event, whatever is drawn from then on; take another splitting.score, "
+         "more"]),
         # A level that nobody reaches: all have collapsed, and that is no probability of 0.
         (0.5, {"levels": [24, 0.1]}, ["nmac 0.000 0.000 to 0.", "nmac.collapsed 1.00"]),
         # One that all begin within is passed.
