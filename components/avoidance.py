@@ -154,7 +154,7 @@ class TurnOut(Component):
     def run(self, wake: Wake) -> dict[str, Message]:
         """Look at every instant with an alert."""
         alerts: AlertLevels | None = wake["alerts"]
-        self._hear(wake)
+        self._take_choices(wake)
         if alerts is None:
             return {}
         manoeuvres: dict[int, Manoeuvre] = {}
@@ -196,7 +196,7 @@ class TurnOut(Component):
         }
         return {port: message for port, message in messages.items() if message is not None}
 
-    def _hear(self, wake: Wake) -> None:
+    def _take_choices(self, wake: Wake) -> None:
         """Take in the latest choice of each other aircraft."""
         since = int(wake.ticks[0]) - int(self.p.heeds_s * self.context.ticks_per_s)
         for new in wake.arrivals("told") if self.p.address is not None else ():
@@ -344,7 +344,7 @@ class TurnAway(Component):
         self._rangeless = NO_COUNTS
 
     def warnings(self) -> list[str]:
-        """Say that nobody measures the range by which it goes."""
+        """Warn that no sensor measures the range that it needs."""
         blind = "" if self.p.without_range else without_range(self.context.producers)
         if not blind:
             return []
@@ -384,7 +384,7 @@ class TurnAway(Component):
         return Manoeuvres.at_rows(wake.instants, manoeuvres)
 
     def _turn(self, *, on_the_left: bool) -> Manoeuvre:
-        """Return the turn for somebody on a side."""
+        """Return the turn away from an aircraft on one side."""
         to_the_right = {"away": on_the_left, "towards": not on_the_left}
         right = to_the_right.get(self.p.direction, self.p.direction == "right")
         bank_deg = self.p.bank_deg or 0.0

@@ -108,7 +108,7 @@ class TrackerStub(Component):
         replica = wake.run.take(updated)
         begins = np.concatenate(([True], replica[1:] != replica[:-1]))
         before = self._held.rows_of_runs(replica[begins])
-        targets, column = _present(before.target, fused.target, len(fused.roster))
+        targets, column = _held_and_new(before.target, fused.target, len(fused.roster))
         pool, held, new = _pool(before, fused, replica.take(rows))
         last = np.full((len(updated), len(targets)), -1, dtype=np.int64)
         if len(held):
@@ -230,7 +230,7 @@ def _pool(
     return {name: v[order] for name, v in pool.items()}, index[:start], index[start:]
 
 
-def _present(held: IntArray, new: IntArray, targets: int) -> tuple[IntArray, IntArray]:
+def _held_and_new(held: IntArray, new: IntArray, targets: int) -> tuple[IntArray, IntArray]:
     """Return the targets that are held or newly measured, ascending, and each one's column."""
     there = np.zeros(targets, dtype=bool)
     there[held] = True

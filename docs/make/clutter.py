@@ -126,7 +126,7 @@ scene, with `--set` or in a study raises the threshold; the hardware stays the s
 range falls, and `check` gives its value.
 
 A `radar.threshold` has the false alarms of its `threshold_db`, whatever the
-`false_alarm_probability`; if that leaves practically none, `check` warns of it.
+`false_alarm_probability`.
 
 A target far below the noise is reported with the probability of false alarm. Such a report lies in
 the target's resolution cell and has no more information: on a grid it has the grid point of the
@@ -149,11 +149,9 @@ has it, as it did before there was a choice: then clutter is detected as if it w
 `check` says so; with `false_alarms` the ground is reported in every cell in which it crosses.
 
 By default the mean power of noise and clutter is known. A real radar averages the cells around:
-`cfar_reference_cells` has it do so (cell-averaging CFAR), at the loss of so few
-({loss_8:.1f} dB with 8 cells, {loss_16:.1f} dB with 16, {loss_64:.1f} dB with 64, at Pfa 1e-6,
-Pd 0.5 and Swerling I). A calibrated range is that of a threshold known exactly; the loss comes on
-top. The cells are taken to hold what the cell under test holds: edges of clutter, and other targets
-among them, are left out.
+`cfar_reference_cells` has it do so (cell-averaging CFAR), at the loss of so few ({loss_8:.1f} dB
+with 8 cells, {loss_16:.1f} dB with 16, {loss_64:.1f} dB with 64, at Pfa 1e-6, Pd 0.5 and Swerling
+I). Edges of clutter, and other targets among the cells, are left out.
 
 `radar.range_boundary` has neither noise nor a threshold. Its boundary is taken as the range of
 one target (`boundary_rcs_dbsm`, `boundary_pd`, `false_alarm_probability`); clutter and the CFAR

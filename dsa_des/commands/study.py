@@ -104,8 +104,10 @@ def show_command(folder: str, no_figures: bool, as_json: bool) -> None:
     show_study(Path(folder), draw=not no_figures, as_json=as_json)
 
 
-def begun_or_empty(location: "Path | Callable[[], Path]", resume: bool, what: str) -> None:
-    """Raise UsageError where a folder holds something that was not to be gone on with."""
+def require_empty_or_resumed(
+    location: "Path | Callable[[], Path]", resume: bool, what: str
+) -> None:
+    """Raise UsageError where a folder is not empty and the command does not resume."""
     if isinstance(location, Path):
         check_place(location)
         if location.is_dir() and any(location.iterdir()) and not resume:

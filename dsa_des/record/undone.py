@@ -56,7 +56,7 @@ def with_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
 def counts_by_run(
     undone: Mapping[str, IntArray | tuple[int, int]], runs: int
 ) -> dict[str, IntArray]:
-    """Return what a block says (`Component.undone`) as counts of all runs."""
+    """Return a block's answer (`Component.undone`) as counts of all runs."""
     result: dict[str, IntArray] = {}
     for what, counts in undone.items():
         said = np.asarray(counts, dtype=np.int64).reshape(2, -1)
@@ -115,11 +115,11 @@ class Tries:
 
     def undone(self, what: str, *, of_two: bool = False) -> dict[str, IntArray]:
         """Return in which runs it was never done, of those that had a source, or two."""
-        enough = has_two(self.had) if of_two else self.had != 0
+        enough = has_two_bits(self.had) if of_two else self.had != 0
         return {what: np.array([enough & ~self.did, enough], dtype=np.int64)}
 
 
-def has_two(mask: Any) -> BoolArray:
+def has_two_bits(mask: Any) -> BoolArray:
     """Return which masks have more than one bit."""
     return np.asarray((mask & (mask - 1)) != 0, dtype=bool)
 

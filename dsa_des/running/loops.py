@@ -39,7 +39,7 @@ def _closing(graph: nx.DiGraph, rank: Callable[[Edge], Any]) -> set[Edge]:
 
 
 def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[Edge]:
-    """Return the delayed edges whose removal leaves no loop, as few as come to hand.
+    """Return delayed edges whose removal leaves no loop, few of them.
 
     Edges into inputs that a block can do without are the first to go: that is where a loop closes.
     """

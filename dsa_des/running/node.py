@@ -26,45 +26,20 @@ from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake, checked_messages
 from dsa_des.errors import RunRefused
 from dsa_des.running.channel import Channel, Inputs
-from dsa_des.running.events import Bell, BlockEnvironment, RunState, WakeUp
+from dsa_des.running.events import (
+    LEAVE_PRIORITY,
+    Abort,
+    Bell,
+    BlockEnvironment,
+    RunState,
+    WakeUp,
+)
 from dsa_des.running.processors import Processor
-from dsa_des.running.windows import Window
+from dsa_des.running.windows import Demand, Window
 from dsa_des.stretches.outages import Outages
 from dsa_des.stretches.stretched_block import StretchedBlock
 from dsa_des.time.clock import MAX_TICK
 from dsa_des.time.run_clock import RunClock
-
-
-@dataclass
-class Demand:
-    """A clocked block downstream, and how long before its scan it needs our row."""
-
-    block: str
-    clock: RunClock
-    lead_ticks: int
-
-    def instants_between(self, start: int, end: int) -> RunTicks:
-        """Return the instants in [start, end) at which this block needs a row.
-
-        None of these rows would arrive after the end of the run, where the clock has no scan.
-        """
-        _, instants = self.clock.between(start + self.lead_ticks, end + self.lead_ticks)
-        return instants.later(-self.lead_ticks) if self.lead_ticks else instants
-
-
-# SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
-WINDOW_PRIORITY = 1.0
-DEPTH_PRIORITY = 1000.0
-# What a block sends later than it is made is there before any block runs.
-LEAVE_PRIORITY = 0.5
-
-
-class Abort(Exception):
-    """Leaves SimPy after a block failed; the failure itself is kept by the simulation.
-
-    SimPy rebuilds an exception from its ``args``, which breaks those that need keywords, so the
-    original never travels through it.
-    """
 
 
 @dataclass
@@ -118,11 +93,11 @@ class Node:
         return self.component if self.stretched is None else self.stretched.now
 
     @property
-    def things(self) -> list[object]:
-        """All whose attributes hold its state."""
+    def state_objects(self) -> list[object]:
+        """All objects whose attributes hold its state."""
         failing = [] if self.outages is None else [self.outages]
         if self.stretched is not None:
-            return [*failing, *self.stretched.things]
+            return [*failing, *self.stretched.state_objects]
         return [*failing, self.component, *self.component.context.effects.values()]
 
     @property
@@ -235,7 +210,7 @@ class Node:
             clocks += [(demand.clock, demand.lead_ticks) for demand in self.demands]
         if self.pulse is not None:
             clocks.append((self.pulse, 0))
-        ticks = [clock.none_before(start + lead) - lead for clock, lead in clocks]
+        ticks = [clock.next_scan_bound(start + lead) - lead for clock, lead in clocks]
         ticks += [wire.quiet_until() for wire in self._trigger_wires]
         return max(start, min(ticks, default=MAX_TICK))
 
@@ -263,7 +238,7 @@ class Node:
             for wire in self._trigger_wires:
                 wire.collect(tick + 1)  # what came to be worked on now is left out with it
             return
-        self._run(_now(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
+        self._run(_instant_of(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
 
     def _run_window(self, start: int, end: int) -> None:
         if self.clock is not None:
@@ -306,7 +281,7 @@ class Node:
     def _run(
         self, instants: RunTicks, scans: IntArray, end: int, idle: BoolArray | None = None
     ) -> None:
-        before = None if self.clock is None else self.clock.before
+        before = None if self.clock is None else self.clock.previous_ticks
         if self.outages is not None and not (up := self.outages.is_up(instants)).all():
             instants, scans = instants.take(up), scans[up]
             idle = None if idle is None else idle[up]
@@ -357,7 +332,7 @@ class Node:
         self._missed = False
         tick = int(self.simulation.env.now)
         scans = np.array([-1], dtype=np.int64)
-        wake = self._inputs.wake_at(_now(tick), scans, tick + 1, complete=False)
+        wake = self._inputs.wake_at(_instant_of(tick), scans, tick + 1, complete=False)
         assert wake is not None
         return wake
 
@@ -415,5 +390,5 @@ def _no_scan_numbers(rows: int) -> IntArray:
     return _NO_SCAN[:rows]
 
 
-def _now(tick: int) -> RunTicks:
+def _instant_of(tick: int) -> RunTicks:
     return RunTicks(runs_of_single(1), np.array([tick], dtype=np.int64))

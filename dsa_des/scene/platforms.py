@@ -33,7 +33,7 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
         raise SceneError(problems)
     left = sorted(scene.blocks.keys() - moved.keys() - carrying.keys())
     while left:  # down the chains, around loops too
-        found = _found(left, near, carrying) or _found(
+        found = _carriers_by_feeders(left, near, carrying) or _carriers_by_feeders(
             [name for name in left if moved.keys() >= set(near[name])], far, carrying
         )
         # What no chain reaches is on the first of all.
@@ -70,7 +70,7 @@ def _feeding(scene: Scene, name: str, *, between: bool) -> list[str]:
     ]
 
 
-def _found(
+def _carriers_by_feeders(
     names: Sequence[str], feeding: Mapping[str, Sequence[str]], carrying: Mapping[str, str]
 ) -> dict[str, str]:
     """Return what carries those of some blocks of which a feeder is known."""

@@ -3,8 +3,8 @@
 import pytest
 
 from docs.make.accuracy_and_cost.answers import AskedStudy, head, section
+from dsa_des.answers.models_in_turns import TurnTimes
 from dsa_des.answers.report import AnswerReport
-from dsa_des.answers.turns import TurnTimes
 from dsa_des.answers.verdicts import Limit
 from tests.answers.test_models_that_may_be_taken import RANGE, change
 

@@ -15,7 +15,7 @@ from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.splitting import FlownRuns, chosen_of, find_levels, run_repetitions
+from dsa_des.replicas.splitting import FlownRuns, choose_parents, find_levels, run_repetitions
 from dsa_des.results.statistics import rare
 from dsa_des.studies.chunk import run_chunk
 from dsa_des.studies.study_file import read_study
@@ -169,7 +169,7 @@ def test_branches_come_from_each_run_as_often_as_it_weighs():
     weights = np.array([1.0, 2.0, 5.0, 2.0])
     often = np.zeros(4)
     for k in range(1000):
-        chosen = np.bincount(chosen_of(weights, 7, (k + 0.5) / 1000), minlength=4)
+        chosen = np.bincount(choose_parents(weights, 7, (k + 0.5) / 1000), minlength=4)
         assert (np.abs(chosen - 0.7 * weights) < 1.0).all()
         often += chosen
     np.testing.assert_allclose(often / 1000, 0.7 * weights, rtol=2e-3)
