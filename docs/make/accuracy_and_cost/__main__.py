@@ -186,11 +186,8 @@ _PAGE = """# What accuracy costs
 
 Which models may be crude without changing the answer?
 
-<!-- not run: minutes -->
-```
-dsa-des cost radar_and_camera_risk --answer nmac_risk_ratio
-dsa-des cost first_light --all
-```
+`dsa-des cost radar_and_camera_risk --answer nmac_risk_ratio` tells it for a study, `dsa-des cost first_light --all`
+for a scene's detections, in minutes.
 
 ![Share of detections that differ against the cost of the run](images/cost_chain.png)
 
