@@ -171,7 +171,7 @@ class TurnOut(Component):
                 tick = int(wake.ticks[index])
                 if run in now:
                     later.append((index, run))
-                elif tick >= self._free_from.get(run, 0) or self._must_give_way(run, tick):
+                elif self._is_free(run, tick) or self._must_give_way(run, tick):
                     now[run] = index
                 elif self.p.address is not None:
                     told[index] = self._repeated_side(run, tick)
@@ -180,7 +180,7 @@ class TurnOut(Component):
             for (run, index), changes in zip(now.items(), result, strict=True):
                 tick = int(wake.ticks[index])
                 change = None if changes is None else self._choose(run, tick, changes)
-                if changes is not None:
+                if changes is not None and self._is_free(run, tick):
                     due = np.array([run])
                     self._stuck = with_cases(self._stuck, due[: change is None], due)
                 if change is not None:
@@ -198,7 +198,7 @@ class TurnOut(Component):
 
     def _take_choices(self, wake: Wake) -> None:
         """Take in the latest choice of each other aircraft."""
-        since = int(wake.ticks[0]) - int(self.p.heeds_s * self.context.ticks_per_s)
+        since = int(wake.ticks.min()) - int(self.p.heeds_s * self.context.ticks_per_s)
         for new in wake.arrivals("told") if self.p.address is not None else ():
             sides = new.message
             columns = sides.run, new.tick, sides.address, sides.side
@@ -227,6 +227,10 @@ class TurnOut(Component):
         self._chosen[run] = tick, side
         return side
 
+    def _is_free(self, run: int, tick: int) -> bool:
+        """Whether its last manoeuvre was long enough ago."""
+        return tick >= self._free_from.get(run, 0)
+
     def _must_give_way(self, run: int, tick: int) -> bool:
         """Whether a lower address has chosen what does not go with its own choice."""
         mine = self._repeated_side(run, tick) if self.p.address is not None else 0
@@ -237,17 +241,17 @@ class TurnOut(Component):
         """Return the change to fly: the smaller one, or the one compatible with the others'
         choices.
 
-        Without a way there it is free.
+        Without a way there it is free, but not before its time.
         """
         others = self._other_choices(run, tick) if self.p.address is not None else []
-        mine = self._repeated_side(run, tick)
-        if mine and self.p.address is not None:  # only a lower address changes what was chosen
-            others = [(a, side) for a, side in others if a < self.p.address]
         if others:
-            there = changes[1] if self._matching_side(others[0][1]) > 0 else changes[0]
+            (address, side), mine = others[0], self._repeated_side(run, tick)
+            # Only a lower address changes what was chosen in this conflict.
+            keeps = mine and address > (self.p.address or 0)
+            there = changes[1] if (mine if keeps else self._matching_side(side)) > 0 else changes[0]
             if math.isfinite(there):
                 return there
-        return smaller(changes)
+        return smaller(changes) if self._is_free(run, tick) else None
 
     def _manoeuvre(self, change: float) -> Manoeuvre:
         """Return what makes a change."""
