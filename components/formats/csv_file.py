@@ -20,13 +20,13 @@ from components.formats.sample_columns import (
     ColumnSpec,
     SampleColumn,
     complete_velocity,
-    enu_velocity,
     in_epoch_units,
     indices_of,
     is_missing,
     name_and_unit,
     time_parser,
     unit_factor,
+    with_velocity,
 )
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import (
@@ -38,7 +38,6 @@ from components.formats.text_rows import (
     shown_columns,
     text_of,
 )
-from dsa_des.arrays.types import FloatArray
 
 _GEOMETRIC = ("geoaltitude", "altgeom", "geomaltitude", "geometricaltitude", "gnssaltitude")
 _BAROMETRIC = ("baroaltitude", "altbaro", "barometricaltitude", "pressurealtitude")
@@ -197,7 +196,7 @@ def record_rows(
     height = columns["alt"].header
     units = next((note.partition(": ")[0] for note in notes if f"{height} in " in note), "")
     recording = table.recording(
-        ownship, _with_velocity, kind=kind, units=units or "the units of its header"
+        ownship, with_velocity, kind=kind, units=units or "the units of its header"
     )
     if f"{height} in m" in units and _seem_feet(recording):
         said = "all its numbers are multiples of 25, as feet are"
@@ -267,10 +266,6 @@ def _header_and_rows(
         elif not one[1].lower().startswith("sep="):
             return one, lines
     problems.fail("the file is empty: a row of column names and rows of samples are needed")
-
-
-def _with_velocity(samples: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    return {**samples, **enu_velocity(samples)}
 
 
 def _rows(lines: Iterator[tuple[int, str]], delimiter: str) -> Iterator[tuple[int, list[str]]]:

@@ -95,6 +95,8 @@ class Recording:
         for name in list(self.samples):
             columns = self.samples.pop(name)  # columns of many rows are not held twice
             columns["time"] = subtract_start(columns["time"], start)
+            for values in columns.values():
+                values.flags.writeable = False  # its flight has them as they are
             made.append(self._flight(name, columns, longest_gap_s))
             if (speed_mps := made[-1].max_speed_mps) > _FASTEST_MPS:
                 self.problems.add(
@@ -116,7 +118,7 @@ class Recording:
         if {"ve", "vn", "vu"} <= columns.keys():
             velocity = (columns["ve"], columns["vn"], columns["vu"])
         angles: dict[str, Any] = {
-            f"{key}_rad": np.radians(columns[key])
+            f"{key}_rad": np.radians(columns.pop(key))
             for key in ("yaw", "pitch", "roll")
             if key in columns
         }
@@ -160,7 +162,8 @@ def subtract_start(time_s: FloatArray, start_s: float) -> FloatArray:
     0.1 and a scan at 0.1 s meets the sample itself.
     """
     elapsed = time_s - start_s
-    resolution = float(np.spacing(max(abs(start_s), float(np.abs(time_s).max()))))
+    largest = max(abs(start_s), -float(time_s.min()), float(time_s.max()))
+    resolution = float(np.spacing(largest))
     decimals = min(9, math.floor(-math.log10(4.0 * resolution)))
     rounded = np.round(elapsed, decimals)
     return rounded if np.all(np.diff(rounded) > 0.0) else elapsed

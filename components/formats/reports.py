@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from components.formats.recording import Recording
-from components.formats.sample_columns import Altitude, SampleColumn, enu_velocity
+from components.formats.sample_columns import Altitude, SampleColumn, with_velocity
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import Problems
 
@@ -88,9 +88,8 @@ def recording_of(
     named = [name for name, callsign in log.callsigns.items() if callsign == ownship]
     own = named[0] if len(named) == 1 else ownship
     return table.recording(
-        own, lambda c: {**c, **enu_velocity(c)},
-        kind=log.kind, units=log.units, callsigns=log.callsigns,
-    )  # fmt: skip
+        own, with_velocity, kind=log.kind, units=log.units, callsigns=log.callsigns
+    )
 
 
 def _number(value: Any) -> float:

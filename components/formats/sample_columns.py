@@ -89,21 +89,21 @@ def is_missing(cell: str) -> bool:
     return cell.strip().lower() in _MISSING
 
 
-def enu_velocity(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Give east, north, up velocity from vx vy vz or trk gs vs; nothing if neither is complete."""
-    if {"vx", "vy", "vz"} <= columns.keys():
-        return {"ve": columns["vx"], "vn": columns["vy"], "vu": columns["vz"]}
-    if {"trk", "gs", "vs"} <= columns.keys():
-        track = np.radians(columns["trk"])
-        return {
-            "ve": columns["gs"] * np.sin(track),
-            "vn": columns["gs"] * np.cos(track),
-            "vu": columns["vs"],
-        }
-    return {}
+def with_velocity(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Put east, north, up velocity in place of vx vy vz or trk gs vs, if either is complete."""
+    kinds = [[columns.pop(part, None) for part in parts] for parts in VELOCITIES]
+    for kind, (first, second, third) in enumerate(kinds):
+        if first is not None and second is not None and third is not None:
+            if kind == 1:
+                track = np.radians(first)
+                first, second = second * np.sin(track), second * np.cos(track)
+            return {**columns, "ve": first, "vn": second, "vu": third}
+    return columns
 
 
 _DAY_S, _NIGHT_S = 86400.0, 7200.0
+#: Clocks that read more count from 1970.
+EPOCH_S = 1e8
 #: A clock that counts from 1970 is beyond these numbers in ns, µs and ms, and in s never.
 _EPOCHS = ((1e17, "ns"), (1e14, "µs"), (1e11, "ms"))
 

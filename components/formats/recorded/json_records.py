@@ -63,12 +63,10 @@ def _records(
 
 
 def _rows_of(document: Any) -> Iterable[Any]:
-    """Return the records of a document: a list of them, one, or columns as pandas writes them."""
-    if isinstance(document, list):
-        return document
+    """Return the records of a document: one, or columns as pandas writes them."""
     if isinstance(document, dict):
         columns, rows = document.get("columns"), document.get("data")
-        if isinstance(columns, list) and isinstance(rows, list):
+        if columns is not None and hasattr(rows, "__iter__"):
             return (dict(zip(map(str, columns), row, strict=False)) for row in rows)
         first = next(iter(document.values()), None)
         if first and all(isinstance(one, dict) for one in document.values()):
