@@ -122,11 +122,11 @@ def attitude_from_path(
         moves = speed >= SLOWEST_TRACK_MPS
         across = v_north * acceleration[0] - v_east * acceleration[1]
         across = across / np.where(moves, speed, 1.0)
-        moving[rows], yaw[rows] = moves[inner], np.arctan2(v_east, v_north)[inner]
+        moving[rows], yaw[rows] = moves[inner], wrap_heading_rad(np.arctan2(v_east, v_north))[inner]
         climb = np.arctan2(v_up, np.where(moves, speed, 1.0))
         pitch[rows] = np.where(moves, climb, 0.0)[inner]
         roll[rows] = np.where(moves, np.arctan2(across, STANDARD_GRAVITY_M_S2), 0.0)[inner]
-    return wrap_heading_rad(_hold_yaw(yaw, moving)), pitch, roll
+    return _hold_yaw(yaw, moving), pitch, roll
 
 
 def _slope_of_velocity(

@@ -129,19 +129,23 @@ class SampledTrajectory:
     ) -> tuple[FloatArray, ...]:
         """Return yaw, pitch and roll along a path, of each piece between gaps by itself."""
         ends = [] if self.away is None else (np.flatnonzero(self.away) + 1).tolist()
-        angles = np.empty((3, len(path[0])))
+        pieces = []
         for first, end in pairwise([0, *ends, len(path[0])]):
             part = slice(first, end)
             velocity: Vector | None = None
             if self.velocity_enu_mps is not None:
                 east, north, up = (along[part] for along in self.velocity_enu_mps)
                 velocity = east, north, up
-            angles[:, part] = attitude_from_path(
-                *(column[part] for column in path),
-                velocity_enu_mps=velocity,
-                wind_east_north_mps=wind_east_north_mps,
+            pieces.append(
+                attitude_from_path(
+                    *(column[part] for column in path),
+                    velocity_enu_mps=velocity,
+                    wind_east_north_mps=wind_east_north_mps,
+                )
             )
-        return tuple(angles)
+        if len(pieces) == 1:
+            return pieces[0]
+        return tuple(np.concatenate(parts) for parts in zip(*pieces, strict=True))
 
     def __getattr__(self, name: str) -> Any:
         """Return what a flight that was made with others has in its coefficients only."""

@@ -117,14 +117,14 @@ def read_csv(
         return recording_of(problems, log, ownship, altitude).flights()
     if data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
         problems.fail(UNKNOWN_JSON)
-    text = text_of(data, problems)
+    lines = each_line(text_of(data, problems))
     del data  # of many rows it is not held beside their samples
-    return record_table(problems, text, ownship, altitude).flights()
+    return record_table(problems, lines, ownship, altitude).flights()
 
 
 def record_table(
     problems: Problems,
-    text: str,
+    lines: Iterator[tuple[int, str]],
     ownship: str | None = None,
     altitude: Altitude | None = None,
     stem: str | None = None,
@@ -132,7 +132,7 @@ def record_table(
     """Return the aircraft of a table, see `read_csv`: two or more, or any, called as its `stem`
     where there is no column of names.
     """
-    (header_line, header_text), body = _header_and_rows(problems, each_line(text))
+    (header_line, header_text), body = _header_and_rows(problems, lines)
     header_text = header_text.lstrip("#").strip(" ")
     delimiter = next((d for d in (",", ";", "\t", "|") if d in header_text), " ")
     ((_, headers),) = _rows(iter([(header_line, header_text)]), delimiter)

@@ -95,12 +95,14 @@ def read_daa(
     problems = Problems(str(path))
     text = text_of(read_content(Path(path), problems), problems)
     reference = (reference_lat_deg, reference_lon_deg, reference_alt_m)
-    return record_daa(problems, text, reference).flights()
+    return record_daa(problems, each_line(text), reference).flights()
 
 
-def record_daa(problems: Problems, text: str, reference: tuple[float, float, float]) -> Recording:
+def record_daa(
+    problems: Problems, lines: Iterator[tuple[int, str]], reference: tuple[float, float, float]
+) -> Recording:
     """Return the aircraft of a `.daa` or `.xyz` file, see `read_daa`."""
-    table, columns = _table(problems, text, ("yaw",))
+    table, columns = _table(problems, lines, ("yaw",))
     notes = table.notes.harmless
     if "sx" in columns:
         notes.append(
@@ -125,15 +127,15 @@ def read_daa_samples(
     """
     problems = Problems(str(path))
     text = text_of(read_content(Path(path), problems), problems)
-    table, _ = _table(problems, text, extra)
+    table, _ = _table(problems, each_line(text), extra)
     return {name: with_velocity(samples) for name, samples in table.samples(None).items()}
 
 
 def _table(
-    problems: Problems, text: str, extra: Sequence[str]
+    problems: Problems, lines: Iterator[tuple[int, str]], extra: Sequence[str]
 ) -> tuple[SampleTable, dict[str, SampleColumn]]:
     """Read a file's rows into a table of samples, not checked yet against each other."""
-    lines = (one for one in each_line(text) if not one[1].lstrip().startswith("#"))
+    lines = (one for one in lines if not one[1].lstrip().startswith("#"))
     header_line, header_text = next(lines, (0, ""))
     if not header_line:
         problems.fail("the file is empty: a row of column names and rows of samples are needed")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.sampled_flight import SampledTrajectory
 from components.formats.text_rows import Problems, TrafficFile
 from components.geometry import SEMI_MAJOR_AXIS_M, unit_vectors
@@ -181,11 +182,21 @@ def aircraft_of(time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray) ->
     Samples are in the order of time. Each belongs to the aircraft whose last place is nearest if
     one could fly from there, else to another. Samples of none that has enough are the first one's.
     """
-    place = SEMI_MAJOR_AXIS_M * unit_vectors(np.radians(lon_deg), np.radians(lat_deg))
-    steps_m = np.linalg.norm(np.diff(place, axis=0), axis=1)
     number = np.zeros(len(time_s), dtype=np.int64)
-    if not (steps_m > _FASTEST_AIRCRAFT_MPS * np.diff(time_s) + _SLACK_M).any():
+
+    def places(rows: slice) -> FloatArray:
+        return SEMI_MAJOR_AXIS_M * unit_vectors(
+            np.radians(lon_deg[rows]), np.radians(lat_deg[rows])
+        )
+
+    def is_of_several(rows: slice) -> bool:
+        steps_m = np.linalg.norm(np.diff(places(rows), axis=0), axis=1)
+        return bool((steps_m > _FASTEST_AIRCRAFT_MPS * np.diff(time_s[rows]) + _SLACK_M).any())
+
+    blocks = range(0, len(time_s), CELLS_AT_ONCE)
+    if not any(is_of_several(slice(first, first + CELLS_AT_ONCE + 1)) for first in blocks):
         return number
+    place = places(slice(None))
     last: list[tuple[float, list[float]]] = []
     for row, (now_s, here) in enumerate(zip(time_s.tolist(), place.tolist(), strict=True)):
         reached = [

@@ -63,6 +63,13 @@ class _Rows:
             append(numbers[k])
 
 
+def _number(value: Any) -> float:
+    """Return a number; NaN for what is none, ``"ground"`` for an altitude say."""
+    if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 2**62:
+        return math.nan
+    return float(value)
+
+
 def _take(columns: dict[str, FloatArray], rows: Any) -> None:
     """Keep some rows of columns, one column after the other: two are there twice at no time."""
     for key in columns:
@@ -150,22 +157,22 @@ class SampleTable:
         if whole:
             rows.add(line, numbers)
 
-    def add_numbers(self, line: int, name: str, values: Sequence[float]) -> None:
-        """Add a sample of numbers in the order of the columns, NaN where there is none."""
+    def add_numbers(self, line: int, name: str, values: Sequence[Any]) -> None:
+        """Add a sample of values in the order of the columns, of which some are no numbers."""
         rows = self._aircraft.get(name) or self._aircraft.setdefault(name, _Rows(self._columns))
         if not name:
             self._problems.add("the aircraft has no name", line=line)
             return
-        for k, ((quantity, _, _, low, high), value) in enumerate(
-            zip(self._plan, values, strict=True)
-        ):
-            if low <= value <= high or value != value:
-                continue
-            if quantity not in self._optional:
-                self._number(line, quantity, self._columns[quantity], repr(value))
-                return
-            values = [*values[:k], math.nan, *values[k + 1 :]]
-        rows.add(line, values)
+        numbers: list[float] = []
+        for (quantity, _, _, low, high), value in zip(self._plan, values, strict=True):
+            number = value if type(value) is float else _number(value)
+            if not low <= number <= high:
+                if quantity not in self._optional and math.isfinite(number):
+                    self._number(line, quantity, self._columns[quantity], repr(number))
+                    return
+                number = math.nan
+            numbers.append(number)
+        rows.add(line, numbers)
 
     def _unusual(self, line: int, quantity: str, cell: str) -> float | None:
         """Return what a cell means that is no plain number: NaN for none, None for a problem."""

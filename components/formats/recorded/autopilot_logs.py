@@ -124,7 +124,7 @@ def _attitude(topics: Mapping[str, Topic], boot_s: FloatArray) -> list[FloatArra
         return [np.full(len(boot_s), np.nan)] * 3
     times_s = np.asarray(known["timestamp"], float) / 1e6
     at = np.clip(np.searchsorted(times_s, boot_s, side="right") - 1, 0, None)
-    w, x, y, z = np.asarray(known["q"], float)[at].T
+    w, x, y, z = np.asarray(known["q"][at], float).T
     yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
     roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))

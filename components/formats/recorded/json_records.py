@@ -1,6 +1,7 @@
 """Read records in JSON, a list of them or one in each line, with the columns of a table."""
 
 from collections.abc import Iterable, Iterator
+from itertools import chain
 from typing import Any
 
 from components.formats.csv_file import known_among, record_rows
@@ -24,15 +25,16 @@ def record_json(
 ) -> Recording:
     """Return the aircraft of records, in a list or a line each, with the columns of a table."""
     warnings: list[str] = []
-    records = _records(problems, data, [])
-    first = next(records, (1, None))[1]
+    records = _records(problems, data, warnings)
+    del data
+    begins, first = next(records, (1, None))
     if first is None or known_among(map(str, first)) < _FEWEST:
         problems.fail(UNKNOWN_JSON)
     headers = [str(key) for key in first]
     keys = list(headers)
 
     def rows() -> Iterator[tuple[int, list[str]]]:
-        for number, one in _records(problems, data, warnings):
+        for number, one in chain([(begins, first)], records):
             yield (
                 number,
                 [

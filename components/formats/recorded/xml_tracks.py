@@ -2,7 +2,7 @@
 
 import math
 from array import array
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from datetime import UTC, datetime
 from xml.parsers import expat
 
@@ -68,17 +68,26 @@ def _float(text: str) -> float:
 _CHUNK = 2**16
 
 
-def _elements(problems: Problems, data: bytes) -> Iterator[tuple[str, dict[str, str] | None, str]]:
-    """Give each element's plain name and, at its begin, its attributes, at its end, its text."""
-    events: list[tuple[str, dict[str, str] | None, str]] = []
+def _elements(
+    problems: Problems, data: bytes, begins: Collection[str], ends: Collection[str]
+) -> Iterator[tuple[str, dict[str, str] | None, str, tuple[str, ...]]]:
+    """Give name, attributes, text and parents of some elements; no text at begins, nor attributes
+    at ends.
+    """
+    events: list[tuple[str, dict[str, str] | None, str, tuple[str, ...]]] = []
+    inside: list[str] = []
     text: list[str] = []
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
+        tag = tag.rpartition(":")[2]
         text.clear()
-        events.append((tag.rpartition(":")[2], attributes, ""))
+        if tag in begins:
+            events.append((tag, attributes, "", tuple(inside)))
+        inside.append(tag)
 
-    def end(tag: str) -> None:
-        events.append((tag.rpartition(":")[2], None, "".join(text).strip()))
+    def end(_: str) -> None:
+        if (tag := inside.pop()) in ends:
+            events.append((tag, None, "".join(text).strip(), tuple(inside)))
         text.clear()
 
     parser = expat.ParserCreate()
@@ -90,65 +99,55 @@ def _elements(problems: Problems, data: bytes) -> Iterator[tuple[str, dict[str, 
             parser.Parse(data[first : first + _CHUNK], first + _CHUNK >= len(data))
             yield from events
             events.clear()
-    except (expat.ExpatError, ValueError, LookupError) as error:
+    except (expat.ExpatError, LookupError) as error:
         problems.fail(f"is no XML that can be read: {error}")
 
 
 def _of_gpx(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
-    name, tracks = "", 0
+    name = ele = when = ""
     names: dict[str, int] = {}
-    inside: list[str] = []
     place: dict[str, str] = {}
-    ele = when = ""
-    for tag, attributes, text in _elements(problems, data):
-        if attributes is not None:
-            inside.append(tag)
-            if tag == "trk":
-                name, tracks = stem, tracks + 1
-                names[name] = names.get(name, 0) + 1
-            elif tag == "trkpt":
-                place, ele, when = attributes, "", ""
-            continue
-        inside.pop()
-        if tag == "name" and inside[-1:] == ["trk"] and text:
-            names[name] -= 1
-            name = text
+    ends = {"name", "ele", "time", "trkpt"}
+    for tag, attributes, text, inside in _elements(problems, data, {"trk", "trkpt"}, ends):
+        if tag == "trk":
+            name = stem
             names[name] = names.get(name, 0) + 1
-        elif tag == "ele" and inside[-1:] == ["trkpt"]:
-            ele = text
-        elif tag == "time" and inside[-1:] == ["trkpt"]:
-            when = text
+        elif attributes is not None:
+            place, ele, when = attributes, "", ""
         elif tag == "trkpt":
             called = name if names.get(name, 0) < 2 else f"{name} {names[name]}"
             lon, lat = (_float(place.get(key, "")) for key in ("lon", "lat"))
             yield called, _instant(when), lon, lat, _float(ele)
+        elif tag == "name" and inside[-1:] == ("trk",) and text:
+            names[name] -= 1
+            name = text
+            names[name] = names.get(name, 0) + 1
+        elif inside[-1:] == ("trkpt",):
+            ele, when = (text, when) if tag == "ele" else (ele, text)
 
 
 def _of_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -> Iterator[_Point]:
     """Give the points of tracks, and those of placemarks with a time each."""
     names: dict[int, str] = {}
-    inside: list[str] = []
     tracks: dict[str, int] = {}
     whens, coords, odd = array("d"), array("d"), dict[int, str | None]()
     when = point = ""
-    for tag, attributes, text in _elements(problems, data):
-        if attributes is not None:
-            inside.append(tag)
-            if tag == "Track":
-                whens, coords, odd = array("d"), array("d"), {}
-            if tag == "Placemark":
-                when = point = ""
-                names.pop(len(inside), None)
-            continue
-        depth = len(inside)
-        inside.pop()
-        if tag == "name":
-            names[depth - 1] = text
-        elif tag == "altitudeMode" and text in _GROUND and not warnings:
-            if inside[-1:] in (["Track"], ["Point"]):
+    begins = {"Track", "Placemark"}
+    ends = {"name", "altitudeMode", "when", "coord", "coordinates", *begins}
+    for tag, attributes, text, inside in _elements(problems, data, begins, ends):
+        parent = inside[-1] if inside else ""
+        if attributes is not None and tag == "Track":
+            whens, coords, odd = array("d"), array("d"), {}
+        elif attributes is not None:
+            when = point = ""
+            names.pop(len(inside) + 1, None)
+        elif tag == "name":
+            names[len(inside)] = text
+        elif tag == "altitudeMode":
+            if text in _GROUND and not warnings and parent in ("Track", "Point"):
                 said = f"heights are {_GROUND[text]} (altitudeMode {text})"
                 warnings.append(f"{said} and are read as above mean sea level")
-        elif tag == "when" and inside[-1:] == ["Track"]:
+        elif tag == "when" and parent == "Track":
             time_s = _instant(text)
             if not isinstance(time_s, float):
                 time_s, odd[len(whens)] = math.nan, time_s
@@ -157,7 +156,7 @@ def _of_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -> 
             coords.extend(_three(text.split()))
         elif tag == "when":
             when = text
-        elif tag == "coordinates" and inside[-1:] == ["Point"]:
+        elif tag == "coordinates" and parent == "Point":
             point = text
         elif tag == "Track":
             if 3 * len(whens) != len(coords):
@@ -175,7 +174,7 @@ def _of_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -> 
             yield name, _instant(when), *_three(point.split(","))
 
 
-def _document(inside: list[str]) -> int:
+def _document(inside: Sequence[str]) -> int:
     """Return at which depth the document is, whose name all that has none of its own goes by."""
     return inside.index("Document") + 1 if "Document" in inside else 0
 
