@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import chain
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
+from itertools import chain, islice
 from os import PathLike
 from pathlib import Path
 
@@ -51,15 +53,19 @@ _ORDER: Mapping[Altitude | None, tuple[str, ...]] = {
 }
 _CLIMBS = (
     "vs", "vertrate", "verticalrate", "verticalspeed", "climb", "climbrate", "geomrate", "barorate",
+    "vspeed", "vertspeed",
 )  # fmt: skip
 # An address is one aircraft's, which a callsign need not be.
 _ADDRESSES = ("icao24", "icao", "hex", "hexident", "icaoaddress", "address")
 _IDENTITIES = (
-    *_ADDRESSES, "id", "name", "callsign", "aircraft", "acid", "flight", "ident",
+    *_ADDRESSES, "id", "name", "callsign", "aircraft", "acid", "flight", "ident", "flightid",
 )  # fmt: skip
 #: When positions were received: state vectors repeat one until the next comes.
 _OF_POSITIONS = ("timeposition", "lastposupdate", "lastposition")
-_CLOCKS = ("time", "timestamp", "t", "posixtime", "unixtime", "utc", "datetime")
+_CLOCKS = (
+    "time", "timestamp", "t", "posixtime", "unixtime", "utc", "datetime", "eventtime", "snapshotid",
+    "networktime",
+)  # fmt: skip
 _TIMES = (*_OF_POSITIONS, *_CLOCKS)
 _DATES = ("date", "utcdate")
 #: Latitude and longitude in one cell.
@@ -82,11 +88,20 @@ _NEEDED = frozenset(quantity for quantity, spec in COLUMNS.items() if spec.requi
 #: Whose tables have names that no one else has, and are in feet, knots and feet per minute.
 _FAMILIES = (
     ("readsb", ({"altgeom"}, {"altbaro"}, {"geomrate"}, {"barorate"})),
-    ("FlightRadar24", ({"timestamp", "utc", "callsign", "speed", "direction"},)),
+    (
+        "FlightRadar24",
+        (
+            {"timestamp", "utc", "callsign", "speed", "direction"},
+            {"snapshotid", "radarid"},
+            {"networktime", "receivertime"},
+        ),
+    ),
     ("BaseStation", ({"hexident"},)),
     # Of OpenSky's data, in Python.
     ("the library traffic", ({"icao24", "altitude", "groundspeed", "verticalrate"},)),
 )
+#: Which family writes 0 for the altitude of what is on the ground, however high that is.
+_ZERO_ON_GROUND = "FlightRadar24"
 #: Fewer different ones may be in steps of 25 by chance.
 _FEW_HEIGHTS = 5
 _OF_FAMILIES = {"alt": "ft", "alt instead": "ft", "gs": "kt", "vs": "ft/min"}
@@ -132,7 +147,7 @@ def record_table(
     """Return the aircraft of a table, see `read_csv`: two or more, or any, called as its `stem`
     where there is no column of names.
     """
-    (header_line, header_text), body = _header_and_rows(problems, lines)
+    (header_line, header_text), body = _header_and_rows(problems, _unframed(lines))
     header_text = header_text.lstrip("#").strip(" ")
     delimiter = next((d for d in (",", ";", "\t", "|") if d in header_text), " ")
     ((_, headers),) = _rows(iter([(header_line, header_text)]), delimiter)
@@ -162,6 +177,8 @@ def record_rows(
     columns, notes = _find_columns(problems, headers, header_line, altitude)
     identity, time = columns.pop("id").index, columns["time"].index
     plain = [name_and_unit(header)[0] for header in headers]
+    is_address, is_zero_ground = plain[identity] in _ADDRESSES, _family(plain) == _ZERO_ON_GROUND
+    high = columns["alt"].index
     date = next((plain.index(name) for name in _DATES if name in plain), None)
     # Where a position's own time is not known, that of its row must do.
     other = next((plain.index(name) for name in _CLOCKS if name in plain), time)
@@ -170,13 +187,16 @@ def record_rows(
         columns["time"] = in_epoch_units(columns["time"], begins, headers[time], notes)
     table = SampleTable(
         problems, headers, identity, columns, time_parser(columns["time"]),
-        columns.keys() - _NEEDED, gaps=True, shared=plain[identity] not in _ADDRESSES,
+        columns.keys() - _NEEDED, gaps=True, shared=not is_address,
         instead={"alt": "alt instead"} if "alt instead" in columns else {},
         least=2 if stem is None else 1, repeats=plain[time] in _OF_POSITIONS,
     )  # fmt: skip
     table.notes.harmless += notes
     nameless = 0
-    for number, row in chain(ahead, rows):
+    rows = chain(ahead, rows)
+    if plain[time] == _OF_MESSAGES:
+        rows = _first_of_seconds(rows, identity, columns, table.notes.warnings)
+    for number, row in rows:
         if len(row) == at + 1 and not row[-1]:
             row.pop()  # a comma at the end
         if position is not None and len(row) == at:
@@ -188,6 +208,10 @@ def record_rows(
             row[time] = row[other]
         if is_nameless and len(row) == len(headers) - 1:
             row.append(str(stem))
+        if is_zero_ground and len(row) >= at and row[high] == "0":
+            row[high] = ""
+        if is_address and len(row) > identity:
+            row[identity] = row[identity].removeprefix("0x")
         if stem is not None and len(row) > identity and not row[identity]:
             row[identity], nameless = stem, nameless + 1
         table.add_row(number, row)
@@ -204,6 +228,31 @@ def record_rows(
             f"{height} has no unit and is read in m, but {said}: {height}_ft would say so"
         )
     return recording
+
+
+#: When a message came in, of whatever receiver: with its delay, and out of order.
+_OF_MESSAGES = "networktime"
+
+
+def _first_of_seconds(
+    rows: Iterator[tuple[int, list[str]]], identity: int, columns: Mapping[str, SampleColumn],
+    warnings: list[str],
+) -> Iterator[tuple[int, list[str]]]:  # fmt: skip
+    """Give rows with a position of one name that are a second apart or more."""
+    time, lat, lon = (columns[key].index for key in ("time", "lat", "lon"))
+    parse, last, left_out = time_parser(columns["time"]), dict[str, float](), 0
+    for number, row in rows:
+        if len(row) > max(time, lat, lon, identity) and (row[lat], row[lon]) != ("0", "0"):
+            with suppress(ValueError):  # of another cell the table says what is wrong
+                now_s = parse(row[time])
+                if now_s - last.get(row[identity], -math.inf) < 1.0:
+                    left_out += 1
+                    continue
+                last[row[identity]] = now_s
+        yield number, row
+    if left_out:
+        said = "within a second of another: receivers' delays differ by as much"
+        warnings.append(f"{left_out} positions were left out that came {said}")
 
 
 #: How many rows may be without a time before the first that has one.
@@ -234,6 +283,23 @@ def _seem_feet(recording: Recording) -> bool:
     heights = np.unique(np.concatenate([one["alt"] for one in recording.samples.values()]))
     steps = not np.any(heights % 25.0)
     return steps and len(heights) >= _FEW_HEIGHTS and bool(np.any(heights % 100.0))
+
+
+#: A line of the frame of a table, and how far from the first line one must be.
+_FRAME, _HEAD = re.compile(r"[+|]?-[-+]+-[+|]?"), 30
+
+
+def _unframed(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    """Give the rows of a table that a shell drew (Impala's, Trino's), its names once."""
+    head = list(islice(lines, _HEAD))
+    names = ""
+    if not any(_FRAME.fullmatch(text) for _, text in head):
+        yield from chain(head, lines)
+        return
+    for number, text in chain(head, lines):
+        if "|" in text and not _FRAME.fullmatch(text) and text != names:
+            names = names or text
+            yield number, text.strip("|")
 
 
 _KNOWN_NAMES = frozenset(_IDENTITIES)
@@ -310,7 +376,7 @@ def _find_columns(
     columns: dict[str, SampleColumn] = {}
     indices = indices_of(specs, names)
     shown = shown_columns(headers, bool(indices))
-    family = next((who for who, marks in _FAMILIES if any(m <= {*names} for m in marks)), None)
+    family = _family(names)
     notes, taken = [], []
     for quantity, spec in specs.items():
         if quantity not in indices:
@@ -342,6 +408,10 @@ def _find_columns(
     for quantity in {q for parts in VELOCITIES for q in parts} - set(kept):
         columns.pop(quantity, None)
     return columns, notes
+
+
+def _family(names: Collection[str]) -> str | None:
+    return next((who for who, marks in _FAMILIES if any(m <= {*names} for m in marks)), None)
 
 
 def _specs(names: list[str], altitude: Altitude | None) -> Mapping[str, ColumnSpec]:

@@ -4,6 +4,7 @@
   and ``trace_full_*.json``, one aircraft each. Feet, knots and feet per minute.
 - SBS-1 (BaseStation) lines ``MSG,3,...``: messages of one aircraft are joined by its address.
 - OpenSky's state vectors in JSON. Metres and m/s.
+- FlightRadar24's JSON: all that is seen (``feed.js``), and single flights. Feet, knots, ft/min.
 """
 
 import json
@@ -51,8 +52,8 @@ def log_of(problems: Problems, data: bytes) -> Log | None:
 
 UNKNOWN_JSON = (
     "is JSON of no known kind: an aircraft.json or trace_full of readsb, OpenSky's states (the "
-    "keys now and aircraft, icao and trace, or time and states), or records with the columns of a "
-    "table are needed"
+    "keys now and aircraft, icao and trace, or time and states), FlightRadar24's playback or feed, "
+    "or records with the columns of a table are needed"
 )
 
 
@@ -266,6 +267,47 @@ def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Po
         yield PositionReport(str(name), time_s, lat, lon, geometric, barometric, trk, gs, climb)
 
 
+def _of_feed(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+    """Give all aircraft of FlightRadar24's live feed, each a list by the number of its flight."""
+    for state in one.values():
+        if isinstance(state, list):
+            address, lat, lon, trk, alt, gs, _, _, _, _, time_s, _, _, _, ground, climb, called = (
+                state[:17]
+            )
+            name = str(address or called)
+            callsigns[name] = str(called)
+            yield PositionReport(
+                name, time_s, lat, lon, None, None if ground else _times(alt, FOOT_M), trk,
+                _times(gs, KNOT_M_S), _times(climb, _FPM),
+            )  # fmt: skip
+
+
+def _of_playback(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+    """Give the points of a flight that FlightRadar24 plays back, of which 0 ft is the ground."""
+    flight = one["result"]["response"]["data"]["flight"]
+    called = flight["identification"]
+    name = str(flight["aircraft"]["identification"].get("modes") or called["id"])
+    callsigns[name] = str(called["callsign"] or "")
+    for point in flight["track"]:
+        yield PositionReport(
+            name, point["timestamp"], point["latitude"], point["longitude"], None,
+            _times(point["altitude"]["feet"] or None, FOOT_M), point["heading"],
+            _times(point["speed"]["kts"], KNOT_M_S), _times(point["verticalSpeed"]["fpm"], _FPM),
+        )  # fmt: skip
+
+
+def _of_details(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+    """Give the trail of a flight among FlightRadar24's details of it, which has no climb."""
+    called = one["identification"]
+    name = str((one.get("aircraft") or {}).get("hex") or called["id"])
+    callsigns[name] = str(called["callsign"] or "")
+    for point in one["trail"]:
+        yield PositionReport(
+            name, point["ts"], point["lat"], point["lng"], None,
+            _times(point["alt"] or None, FOOT_M), point["hd"], _times(point["spd"], KNOT_M_S),
+        )  # fmt: skip
+
+
 #: By the keys that a document has: what it is called, and what reads it.
 _FEET = "ft and kt"
 _JSON: tuple[tuple[frozenset[str], str, str, _Reader], ...] = (
@@ -274,6 +316,9 @@ _JSON: tuple[tuple[frozenset[str], str, str, _Reader], ...] = (
     (frozenset({"icao", "timestamp", "trace"}), "a trace of readsb", _FEET, _of_trace),
     (frozenset({"time", "states"}), "OpenSky's states", "m and m/s", _of_states),
     (frozenset({"icao24", "path"}), "a track of OpenSky", "m", _of_path),
+    (frozenset({"full_count", "version"}), "FlightRadar24's live feed", _FEET, _of_feed),
+    (frozenset({"result", "_api"}), "FlightRadar24's playback", _FEET, _of_playback),
+    (frozenset({"identification", "trail"}), "FlightRadar24's details", _FEET, _of_details),
 )
 
 

@@ -115,7 +115,7 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
     if match:
         header, unit = match[1], match[2]
     else:
-        base, _, suffix = header.rpartition("_")
+        base, _, suffix = re.sub(r"(?<=[a-z])(?=[A-Z][a-z]*$)", "_", header).rpartition("_")
         if base and clean_token(suffix) in ALL_TOKENS:
             header, unit = base, suffix
     return re.sub(r"[\s_\-.]", "", header).lower(), unit
@@ -153,7 +153,8 @@ def time_parser(column: SampleColumn) -> Callable[[str], float]:
                 return last
             if "-" not in cell[1:] and "/" not in cell:
                 raise
-            instant = datetime.fromisoformat(cell.replace("/", "-").removesuffix(" UTC"))
+            plain = cell.replace("/", "-").replace("Z.", ".").removesuffix(" UTC")
+            instant = datetime.fromisoformat(plain)
             if instant.tzinfo is None:
                 instant = instant.replace(tzinfo=UTC)
             return instant.timestamp()

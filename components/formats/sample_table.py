@@ -37,6 +37,11 @@ _SHORTEST_STEP_S = 1e-6
 #: At most one of so many samples may be at the instant of another, or lack an optional number that
 #: the nearest sample has within so many seconds: more is no slip of a recorder.
 _ONE_IN, _NEAR_S = 10, 5.0
+#: However many, they are one aircraft's by a clock of whole seconds, where no two are further apart
+#: than this.
+_OF_A_SECOND = {"lat": 0.0008, "lon": 0.0008, "alt": 50.0}
+#: Who is further from 0° N 0° E at some time is not there where only zeros stand, deg.
+_NEAR_0_DEG = 1.0
 #: What a row lacks that is left out; all other needed columns are its position.
 _LACKS = {"time": "time", "alt": "height"}
 
@@ -125,7 +130,7 @@ class SampleTable:
             for quantity, column in columns.items()
         ]
         used = {name_column, *(column.index for column in columns.values())}
-        if ignored := [header for i, header in enumerate(headers) if i not in used]:
+        if ignored := [one for i, one in enumerate(headers) if one and i not in used]:
             self.notes.harmless.append(f"columns ignored: {', '.join(ignored)}")
 
     def add_row(self, line: int, row: list[str] | int) -> None:
@@ -254,6 +259,15 @@ class SampleTable:
                 if lacks.any():
                     self._lacks[_LACKS.get(key, "position")] = 1
                     there &= ~lacks
+            if self._gaps and {"lat", "lon"} <= columns.keys():
+                # Many write zeros where no position is known.
+                nowhere = (columns["lat"] == 0.0) & (columns["lon"] == 0.0)
+                if (
+                    nowhere.any()
+                    and np.nanmax(np.hypot(columns["lat"], columns["lon"])) > _NEAR_0_DEG
+                ):
+                    self._lacks["position"] = 1
+                    there &= ~nowhere
             if not there.all():
                 left_out += int(np.count_nonzero(~there))
                 lines = lines[there]
@@ -392,7 +406,8 @@ class SampleTable:
             _take(columns, once)
         times, header = columns["time"], self._columns["time"].header
         at_once = np.diff(times) < _SHORTEST_STEP_S
-        if self._gaps and 0 < (count := int(np.count_nonzero(at_once))) <= len(times) // _ONE_IN:
+        count = int(np.count_nonzero(at_once))
+        if self._gaps and count and (count <= len(times) // _ONE_IN or _stays(columns, at_once)):
             said = f"several samples at one instant, {count} times: the last one counts"
             self.notes.note_aircraft(name, "at once", said)
             _take(columns, np.append(~at_once, True))
@@ -429,6 +444,14 @@ class SampleTable:
                 line=int(first.min()),
                 column=self._columns["time"].header,
             )
+
+
+def _stays(columns: dict[str, FloatArray], at_once: Any) -> bool:
+    """Tell whether samples at one instant are near each other: the clock is coarse."""
+    return columns.keys() >= _OF_A_SECOND.keys() and all(
+        bool((np.abs(np.diff(columns[key])[at_once]) <= most).all())
+        for key, most in _OF_A_SECOND.items()
+    )
 
 
 def _filled(times: FloatArray, values: FloatArray) -> FloatArray | None:

@@ -14,6 +14,7 @@ _FIX = re.compile(
 )
 #: Whose header says what the aircraft is called: competition number, else registration.
 _NAMES = (re.compile(r"HFCID[^:]*:\s*(\S.*)", re.I), re.compile(r"HFGID[^:]*:\s*(\S.*)", re.I))
+_NAMELESS = frozenset({"none", "nkn", "nil", "unknown", "not recorded"})
 _EXTENSION = re.compile(r"(\d\d)(\d\d)([A-Z0-9]{3})")
 _DAY = timedelta(days=1)
 
@@ -35,7 +36,7 @@ def igc_log(problems: Problems, data: bytes, stem: str) -> Log:
 def _name(text: str) -> str:
     for pattern in _NAMES:
         for _, line in islice(each_line(text), 200):
-            if match := pattern.match(line):
+            if (match := pattern.match(line)) and match[1].strip().lower() not in _NAMELESS:
                 return match[1].strip()
     return ""
 

@@ -35,9 +35,10 @@ from dsa_des.files.input_files import LARGEST_BYTES
 
 #: What is read, for messages.
 KINDS = (
-    "aircraft.json and traces of readsb, SBS-1 lines, OpenSky's states (JSON, CSV, Parquet), "
-    "tables with time, name, latitude, longitude and altitude, .daa and .xyz of DAIDALUS, GPX, KML "
-    "with times, IGC, PX4's .ulg, MAVLink's .tlog, and ASTERIX, also in pcap and pcapng"
+    "aircraft.json and traces of readsb, SBS-1 lines, OpenSky's states (JSON, CSV, Parquet, text), "
+    "FlightRadar24's JSON, tables with time, name, latitude, longitude and altitude, .daa and .xyz "
+    "of DAIDALUS, GPX, KML with times, IGC, PX4's .ulg, MAVLink's .tlog, and ASTERIX, also in pcap "
+    "and pcapng"
 )
 #: So many of the needed columns may be missing of what is taken for a table of ours.
 _LACKING = 3

@@ -122,7 +122,7 @@ def _of_gpx(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
             names[name] -= 1
             name = text
             names[name] = names.get(name, 0) + 1
-        elif inside[-1:] == ("trkpt",):
+        elif inside[-1:] == ("trkpt",) and tag != "name":
             ele, when = (text, when) if tag == "ele" else (ele, text)
 
 
