@@ -15,11 +15,11 @@ import numpy as np
 from components.alert_configuration.conf_file import read_conf
 from components.alerting.levels import due_levels, violation_times_s
 from components.benchmark.scenes import SCENES, replicas_of, scene_of, select_cases
-from components.benchmark.shares import shares_by_block
-from components.benchmark.track_updates import LOOKS, by_stone_soup, plainly, updates
+from components.benchmark.time_shares import shares_by_block
+from components.benchmark.track_updates import LOOKS, plain_updates, stone_soup_updates, updates
 from components.examples import folder
 from components.guidance.bands import guidance_of_many
-from components.guidance.kinds import KINDS
+from components.guidance.manoeuvre_kinds import KINDS
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
 from dsa_des.record.recording import Recorder
@@ -232,7 +232,10 @@ RATES = (
         5e5,
         4000 * LOOKS,
         _tracks_in_lock_step,
-        {"a plain loop": lambda quick: plainly(4), "Stone Soup": lambda quick: by_stone_soup(4)},
+        {
+            "a plain loop": lambda quick: plain_updates(4),
+            "Stone Soup": lambda quick: stone_soup_updates(4),
+        },
     ),
     Rate(
         "track_updates_alone",
@@ -240,7 +243,7 @@ RATES = (
         2e4,
         100 * LOOKS,
         _tracks_of_one_run,
-        {"a plain loop": lambda quick: plainly(10 if quick else 100)},
+        {"a plain loop": lambda quick: plain_updates(10 if quick else 100)},
     ),
     Rate(
         "replicas",

@@ -76,7 +76,7 @@ def fresh(kind: str, name: str, quick: bool, repeats: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Asked:
-    """How things are to be measured, and where it is said."""
+    """How to measure, and where to print it."""
 
     console: Any
     quick: bool

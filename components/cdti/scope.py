@@ -1,4 +1,4 @@
-"""What the display shows: listens to a run's messages, and tells how things are at an instant.
+"""The content of the display: it receives a run's messages, and gives the picture at an instant.
 
 The thread of the simulation calls `listen`; any other may call `picture`. What they share is
 replaced as a whole, never changed.
@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration
+from components.atmosphere.pressure_altitude import scene_air
 from components.cdti.camera import CameraSights
 from components.cdti.contacts import (
     Contacts,
@@ -21,6 +22,7 @@ from components.cdti.contacts import (
     contacts_of_states,
 )
 from components.cdti.loss_area import predicted_loss_area
+from components.cdti.sensors import describe_sensors, longest_silences_s, silent_sensors
 from components.messages.alerts import (
     BAND_KINDS,
     BAND_REGIONS,
@@ -29,12 +31,11 @@ from components.messages.alerts import (
     contact_name,
 )
 from components.messages.decisions import Decisions
-from components.messages.detections import Detections, SensorOffer
+from components.messages.detections import Detections
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
-from components.sensor.marks import IR
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
@@ -46,8 +47,6 @@ from dsa_des.text.safe_text import printable
 FORGOTTEN_S = 10.0
 #: Bands of guidance stand for so long, s: until the alerting has looked again.
 BANDS_LAST_S = 1.5
-#: A sensor from which nothing has come for so many of its scans, and so long, is said to be out.
-_SILENT_SCANS, _SILENT_S = 2.5, 1.0
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
 _LOOKAHEAD_S = 120.0
 _UNKNOWN = (None, None, None)
@@ -90,12 +89,13 @@ class Scope:
 
     def __init__(self, simulation: Simulation, platform: str | None = None) -> None:
         self._per_s = simulation.ticks_per_s
-        self._platform = _shown(simulation, platform)
+        self._platform = _display_platform(simulation, platform)
         on = "", self._platform
         components = {n: c for n, c in simulation.components.items() if c.context.platform in on}
         #: Blocks whose messages are shown.
         self._on_board = frozenset(components)
         self._own = OwnFlight()
+        self._air = scene_air(simulation.scene.sections)
         self._sights = CameraSights(components)
         self._contacts: Contacts | None = None
         self._alerts: _Alerts | None = None
@@ -105,7 +105,7 @@ class Scope:
         #: What was made of the latest alerts, for as long as they are the latest.
         self._looked: tuple[_Alerts, Any, Any, Any] | None = None
         self._heard: dict[str, float] = {}
-        self._silence_s = _longest_silence_s(simulation)
+        self._silence_s = longest_silences_s(simulation)
         self._names: tuple[str, ...] = ()
         #: Names of all targets, fit to be shown.
         self.names: list[str] = []
@@ -118,11 +118,7 @@ class Scope:
         kinds = (StateTracks, Tracks, FusedDetections)
         #: What contacts are taken from: the best that the scene has.
         self._believed = next((k for k in kinds if any(issubclass(t, k) for t in senders)), None)
-        self.sensors = [
-            _sensor(name, component)
-            for name, component in sorted(components.items())
-            if any(issubclass(o.message, Detections) for o in component.outputs.values())
-        ]
+        self.sensors = describe_sensors(components)
 
     # -- the thread of the simulation ------------------------------------------------------------
 
@@ -237,6 +233,9 @@ class Scope:
                 "own": None, "contacts": [], "alerts": [], "area": [], "bands": {}, "out": []
             }  # fmt: skip
         shown = [] if contacts is None else contacts.rows_to_show(own, time_s, FORGOTTEN_S)
+        # What is reported is a pressure altitude, and compared with the ownship's own.
+        air = self._air
+        own_m = own.alt_m if air is None else float(air.pressure_altitude_m(own.alt_m))
         flights: dict[int, list[float]] = {}
         said: list[dict[str, Any]] = []
         area: list[list[float]] = []
@@ -254,7 +253,7 @@ class Scope:
             flight = [*flights.get(one[0], _UNKNOWN)]
             alt_m, climb, seen_s = reported.get(one[0], (math.nan, math.nan, -math.inf))
             if time_s - seen_s < FORGOTTEN_S and one[3] is not None:
-                one[3] = round(alt_m - own.alt_m, 2)
+                one[3] = round(alt_m - own_m, 2)
                 flight[2] = round(climb, 2) if math.isfinite(climb) else flight[2]
             one += flight
             one.append(level.get(one[0], 0))
@@ -269,11 +268,7 @@ class Scope:
             "alerts": said,
             "area": area,
             "bands": _bands_at(bands, time_s),
-            "out": [
-                printable(name)
-                for name, longest_s in self._silence_s.items()
-                if time_s - heard.get(name, 0.0) > longest_s
-            ],
+            "out": silent_sensors(self._silence_s, heard, time_s),
         }
 
     def camera(self, picture: dict[str, Any], time_s: float, chosen: int) -> dict[str, Any] | None:
@@ -369,7 +364,7 @@ def _flights(alerts: _Alerts) -> dict[int, list[float]]:
     return {int(t): flight for t, flight in zip(alerts.target, rounded, strict=True)}
 
 
-def _shown(simulation: Simulation, platform: str | None) -> str:
+def _display_platform(simulation: Simulation, platform: str | None) -> str:
     """Return what carries a display: what is asked for, else what carries the console.
 
     Empty where nothing is known to carry a block; `UsageError` for what carries none.
@@ -399,40 +394,3 @@ def _rules_of(components: Mapping[str, Component]) -> tuple[Configuration, Alert
             configuration = read_conf(component.p.conf)
             return configuration, configuration.alerters[component.p.alerter - 1]
     return None
-
-
-def _longest_silence_s(simulation: Simulation) -> dict[str, float]:
-    """Return after which silence each sensor is out, s: those that are switched on at the start."""
-    scene, result = simulation.scene, dict[str, float]()
-    for name, component in sorted(simulation.components.items()):
-        sends = any(issubclass(o.message, Detections) for o in component.outputs.values())
-        if not sends or not getattr(component.p, "enabled", True):
-            continue
-        every = [
-            one.blocks[name].parameters for one in (scene, *(s.scene for s in scene.stretches))
-        ]
-        clocks = [clock for p in every if (clock := component.clock_of(p)) is not None]
-        if clocks:
-            slowest_s = max(float(1 / clock.rate_hz) for clock in clocks)
-            first_s = max(float(clock.offset_s) for clock in clocks)
-            result[name] = max(_SILENT_SCANS * slowest_s, _SILENT_S) + first_s
-    return result
-
-
-def _sensor(name: str, component: Component) -> dict[str, Any]:
-    """Return where a sensor looks, deg and m; what is not known is None."""
-    offer: SensorOffer = component.offer("detections")
-    kind = "radar" if offer.measures_range else "ir" if component.mark is IR else "eo"
-    reach = offer.reach
-    result: dict[str, Any] = {"name": printable(name), "kind": kind}
-    if reach is None or not reach.enabled:
-        return {**result, "range": None, "azimuth": None}
-    # Bounds are in the sensor's axes.
-    turned_deg = getattr(component.p, "mount_azimuth_deg", 0.0)
-    low, high = (round(math.degrees(edge) + turned_deg, 3) for edge in reach.azimuth_rad)
-    far = getattr(component, "reach", reach).range_max_m
-    return {
-        **result,
-        "range": round(far, 1) if math.isfinite(far) else None,
-        "azimuth": [low, high],
-    }

@@ -20,7 +20,7 @@ _MANOEUVRE: dict[str, Any] = {
 
 @dataclass
 class Alerted:
-    """When which target was alerted to at which level, and when who was told to fly otherwise."""
+    """Alerts by target, level and time, and the times of commanded manoeuvres."""
 
     #: Target → level, and from when to when, s; of several alerting blocks the highest counts.
     stretches: dict[str, list[tuple[int, float, float]]] = field(default_factory=dict)
@@ -34,14 +34,14 @@ class Alerted:
         run = RecordedTables(folder, {n: read_table(folder / f"{n}.parquet") for n in names})
         result = cls()
         if "manoeuvres" in names:
-            result.manoeuvres = _by_platform(run)
+            result.manoeuvres = _manoeuvre_times_by_platform(run)
         if "alerts" in names and run.tables["alerts"].num_rows:
             result.stretches = _stretches(run)
         return result
 
     @property
     def manoeuvres_s(self) -> FloatArray:
-        """When any were told, s."""
+        """Times of all commanded manoeuvres, s."""
         return np.unique(np.concatenate([np.empty(0), *self.manoeuvres.values()]))
 
     @property
@@ -69,7 +69,7 @@ def style_of(level: int) -> tuple[str, float]:
     return _LEVELS[min(level, len(_LEVELS)) - 1]
 
 
-def _by_platform(run: RecordedTables) -> dict[str, FloatArray]:
+def _manoeuvre_times_by_platform(run: RecordedTables) -> dict[str, FloatArray]:
     """Return the times of manoeuvres by whom they steer."""
     time_s = run.numbers("manoeuvres", "time_s")
     on = np.full(len(time_s), "", dtype=object)
@@ -79,19 +79,27 @@ def _by_platform(run: RecordedTables) -> dict[str, FloatArray]:
 
 
 def _stretches(run: RecordedTables) -> dict[str, list[tuple[int, float, float]]]:
-    """Return the alerts of each target; each lasts until the alerting looks again."""
+    """Return the alerts of each target; each lasts until what alerts looks again."""
     level = run.numbers("alerts", "level").astype(np.int64)
     time_s = run.numbers("alerts", "time_s")
-    looks = np.unique(time_s)
-    last = float(np.median(np.diff(looks))) if len(looks) > 1 else 0.0
-    ends = np.append(looks[1:], looks[-1] + last)
+    block = np.array(run.texts("alerts", "block") if run.has("alerts", "block") else [""])
+    block = np.broadcast_to(block, level.shape)
+    each = {name: np.unique(time_s[block == name]) for name in np.unique(block).tolist()}
+    last = {n: float(t[-1] + (np.median(np.diff(t)) if len(t) > 1 else 0)) for n, t in each.items()}
+    looks = np.unique(np.append(time_s, [*last.values()]))
+    ends = np.append(looks[1:], looks[-1])
     on = np.flatnonzero(level > 0)
     targets = np.array(run.tables["alerts"]["target"].take(on).to_pylist(), dtype=object)
     result: dict[str, list[tuple[int, float, float]]] = {}
     for target in sorted({name for name in targets.tolist() if name is not None}):
-        mine = on[targets == target]
         highest = np.zeros(len(looks), dtype=np.int64)
-        np.maximum.at(highest, np.searchsorted(looks, time_s[mine]), level[mine])
+        for name, mine in each.items():
+            here = on[(targets == target) & (block[on] == name)]
+            said = np.zeros(len(mine), dtype=np.int64)
+            np.maximum.at(said, np.searchsorted(mine, time_s[here]), level[here])
+            look = np.searchsorted(mine, looks, side="right") - 1
+            stands = (look >= 0) & ((looks < last[name]) | (looks == mine[-1]))
+            highest = np.maximum(highest, np.where(stands, said[look], 0))
         edges = np.flatnonzero(np.diff(highest, prepend=-1, append=-1))
         result[target] = [
             (int(highest[a]), float(looks[a]), float(ends[b - 1]))
@@ -127,6 +135,6 @@ def draw_alerted_lines(
 
 
 def draw_manoeuvres(axes: Any, x: FloatArray, y: FloatArray) -> None:
-    """Mark where, or when, an aircraft was told to fly otherwise."""
+    """Mark where, or when, an aircraft was commanded a manoeuvre."""
     if len(x):
         axes.plot(x, y, **_MANOEUVRE, zorder=3.2, scalex=False, scaley=False, clip_on=False)

@@ -105,7 +105,7 @@ def estimated_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
 
 
 def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
-    """Return rows of ``tracks`` with a range, one for each measurement held, and where it was.
+    """Return one row of ``tracks`` for each held measurement with a range, and its position.
 
     Places are as in `estimated_positions`, at ``measured_s``.
     """
@@ -126,12 +126,18 @@ def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
         return nothing
     rows = np.array(kept)
     if run.has("tracks", POSE[0]):  # as believed, where that is recorded
-        pose: FloatArray | None = run.stack_columns("tracks", POSE, rows)
+        pose = run.stack_columns("tracks", POSE, rows)
     else:
-        pose = run.true_poses(measured_s[rows])
-    if pose is None:
-        raise UsageError(
-            f"{run.folder}: truth.parquet does not say where the ownship was when tracks were "
-            "measured: record it with truth = true under [record]"
-        )
+        pose = np.empty((len(POSE), len(rows)))
+        on = run.texts("tracks", "platform") if run.has("tracks", "platform") else []
+        carrying = np.array([on[row] if on else None for row in kept], dtype=object)
+        for platform in {*carrying.tolist()}:
+            mine = np.flatnonzero(carrying == platform)
+            true = run.true_poses(measured_s[rows[mine]], platform)
+            if true is None:
+                raise UsageError(
+                    f"{run.folder}: truth.parquet does not say where {platform or 'the ownship'} "
+                    "was when tracks were measured: record it with truth = true under [record]"
+                )
+            pose[:, mine] = true
     return rows, sights(run.stack_columns("tracks", LINE, rows), pose)[1]

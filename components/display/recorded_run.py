@@ -65,9 +65,23 @@ class RecordedTables:
             for block, on in _pairs(table)
             if on is not None
         }
-        flown = {*self.texts("truth", "target")} if self.has("truth", "target") else set()
-        in_order = sorted(found, key=lambda pair: (pair[0] in flown, pair))
+        # Without truth it is by its usual name that the ownship is known.
+        in_order = sorted(found, key=lambda of: (of[0] in self._targets, of[0] != OWNSHIP, of))
         return {block: on for on, block in in_order}
+
+    @cached_property
+    def _targets(self) -> set[str | None]:
+        return {*self.texts("truth", "target")} if self.has("truth", "target") else set()
+
+    @cached_property
+    def own_name(self) -> str:
+        """What others call the ownship: who carries blocks or is seen, but is no true target."""
+        if not self.carrying:
+            return OWNSHIP
+        seen = {name: None for table in ("detections", "tracks", "alerts")
+                if self.has(table, "target") for name in self.texts(table, "target")}  # fmt: skip
+        known = [name for name in (*self.carrying.values(), *seen) if name is not None]
+        return next((name for name in known if name not in self._targets), OWNSHIP)
 
     def seen_from(self, platform: str) -> "RecordedTables":
         """Return what one of several platforms has: it is the ownship, which takes its place."""
@@ -77,8 +91,12 @@ class RecordedTables:
                 f"{self.folder}: --platform {platform!r}: nothing of this run is carried by it"
                 f"{did_you_mean(platform, names)}"
             )
-        return replace(self, tables={n: _on(n, t, platform, names[0]) for n, t in
-                                     self.tables.items()}, _kept={})  # fmt: skip
+        own = self.own_name
+        tables = {
+            name: _rows_on_platform(name, table, platform, own)
+            for name, table in self.tables.items()
+        }
+        return replace(self, tables=tables, _kept={})
 
     @cached_property
     def _with_pose(self) -> Any:
@@ -92,21 +110,21 @@ class RecordedTables:
         """Return the true flight of each aircraft by its name, the ownship first.
 
         The columns of `_STATE` in order of time; refused without truth, or if a target is called as
-        the ownship is here.
+        the ownship is here (`own_name`).
         """
         if "truth" not in self.tables:
             raise UsageError(
                 f"{self.folder}: has no truth.parquet, which holds the flights: it is recorded "
                 "where it is small; ask for it with truth = true under [record]"
             )
-        names = self.texts("truth", "target")
-        if OWNSHIP in names:
-            raise UsageError(f"{self.folder}: a target is called {OWNSHIP!r}: rename it")
+        names, own = self.texts("truth", "target"), self.own_name
+        if own in names:
+            raise UsageError(f"{self.folder}: a target is called {own!r}: rename it")
         result: dict[str, dict[str, FloatArray]] = {}
         columns = {name: self.numbers("truth", name) for name in _STATE}
         self.refuse_large("truth", columns)
-        aircraft = np.array([OWNSHIP if name is None else name for name in names], dtype=object)
-        for name in [OWNSHIP, *sorted({n for n in names if n is not None})]:
+        aircraft = np.array([own if name is None else name for name in names], dtype=object)
+        for name in [own, *sorted({n for n in names if n is not None})]:
             mine = np.flatnonzero(aircraft == name)
             mine = mine[np.argsort(columns["time_s"][mine], kind="stable")]
             time_s, first = np.unique(columns["time_s"][mine], return_index=True)
@@ -114,9 +132,11 @@ class RecordedTables:
                 result[name] = {key: values[mine][first] for key, values in columns.items()}
         return result
 
-    def true_poses(self, time_s: FloatArray) -> FloatArray | None:
-        """Return the ownship's true poses (6, n); None where one of the instants has none."""
-        own = self.flights().get(OWNSHIP)
+    def true_poses(self, time_s: FloatArray, platform: str | None = None) -> FloatArray | None:
+        """Return the true poses (6, n) of a platform, by default the ownship; None where one of the
+        instants has none.
+        """
+        own = self.flights().get(platform or self.own_name)
         if own is None:
             return None
         at = np.minimum(np.searchsorted(own["time_s"], time_s), len(own["time_s"]) - 1)
@@ -136,7 +156,7 @@ class RecordedTables:
                 )
 
     def numbers(self, table: str, name: str) -> FloatArray:
-        """Return a column as numbers, NaN where nothing stands; refuse any other."""
+        """Return a column as numbers, NaN where it is null; refuse one that is not numeric."""
         try:
             column = self._column(table, name).to_numpy(zero_copy_only=False)
             return np.asarray(column, dtype=np.float64)
@@ -181,7 +201,7 @@ def _pairs(table: Any) -> set[tuple[str, str | None]]:
     return {(row["block"], row["platform"]) for row in rows.to_pylist()}
 
 
-def _on(name: str, table: Any, platform: str, first: str) -> Any:
+def _rows_on_platform(name: str, table: Any, platform: str, first: str) -> Any:
     """Return a table's rows of blocks on a platform; of the truth all, as seen from it."""
     import pyarrow as pa
     import pyarrow.compute as pc

@@ -13,6 +13,7 @@ def stone_soup(
     *,
     origin: tuple[float, float, float] | None = None,
     range_rates: bool = False,
+    platform: str | None = None,
 ) -> "StoneSoupRun":
     """Return a recorded run as Stone Soup's objects: detections, the ownship's poses and truth.
 
@@ -24,6 +25,8 @@ def stone_soup(
         east, y north and z up; by default that of the run's tracks, or where the ownship was first.
     range_rates : bool
         Whether measured range rates count; leave it where those of a radar fold (a low pulse rate).
+    platform : str, optional
+        Of several platforms, the one that is the ownship here; by default the scene's.
 
     Returns
     -------
@@ -43,4 +46,7 @@ def stone_soup(
     from components.display.recorded_run import tables_of
     from components.export.stone_soup_run import recorded_run
 
-    return recorded_run(tables_of(run), origin, range_rates)
+    tables = tables_of(run)
+    if platform is not None or tables.carrying:
+        tables = tables.seen_from(platform or tables.own_name)
+    return recorded_run(tables, origin, range_rates)

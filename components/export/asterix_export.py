@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from components.display.picture import LINE, estimated_positions, held_positions, sights
-from components.display.recorded_run import OWNSHIP, POSE, RecordedTables
+from components.display.recorded_run import POSE, RecordedTables
 from components.estimation.frame import frame_change
 from components.formats.asterix_records import (
     ADS_B,
@@ -217,7 +217,7 @@ def _ownship_reports(run: RecordedTables) -> Iterator[AsterixRecord]:
     """Give the ownship's flight as it would broadcast it."""
     if "truth" not in run.tables:
         return
-    own = run.flights().get(OWNSHIP)
+    own = run.flights().get(run.own_name)
     if own is None:
         return
     north, east = own["velocity_north_m_s"], own["velocity_east_m_s"]
@@ -227,6 +227,6 @@ def _ownship_reports(run: RecordedTables) -> Iterator[AsterixRecord]:
         "track_deg": np.degrees(np.arctan2(east, north)),
         "velocity_up_m_s": -own["velocity_down_m_s"],
     }  # fmt: skip
-    fixed = {"sac": _SAC, "sic": 0, "number": 1, "simulated": 1, "name": OWNSHIP.upper()}
+    fixed = {"sac": _SAC, "sic": 0, "number": 1, "simulated": 1, "name": callsign(run.own_name)}
     for k, time_s in enumerate(own["time_s"].tolist()):
         yield AsterixRecord(ADS_B, time_s, fixed | {n: float(v[k]) for n, v in columns.items()})

@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from components.display.picture import LINE, estimated_positions, held_positions, sights
-from components.display.recorded_run import OWNSHIP, POSE, RecordedTables
+from components.display.recorded_run import POSE, RecordedTables
 from components.display.symbols import LEVELS_ON_DARK, ON_DARK, block_marks
 from components.export.alert_levels import Alert, alerts_of
 from components.messages.state_tracks import HELD
@@ -81,7 +81,7 @@ def globe_run(run: RecordedTables) -> GlobeRun:
     """Return what globes show of a run; `UsageError` where its tables are not those of one."""
     flights = [
         Course(
-            name, ON_DARK["own" if name == OWNSHIP else "truth"], flight["time_s"],
+            name, ON_DARK["own" if name == run.own_name else "truth"], flight["time_s"],
             np.stack([flight[key] for key in _PLACE], axis=1),
         )
         for name, flight in run.flights().items()

@@ -21,7 +21,8 @@ _JUDGED, _ACTS = ("verified", "rejected"), ("turn", "climb")
 def operator_csv(run: RecordedTables) -> bytes:
     """Return a row for each alert: when it came, was on screen, was looked at, judged, acted on.
 
-    Alerts are those of `alerts_of`.
+    Alerts are those of `alerts_of`; of several platforms those on which somebody decides, each by
+    itself.
     To it belongs the first decision of each kind about the target, or about "track N" as displays
     name what is known by a track alone, while it lasts; a manoeuvre also where it names no target,
     but not one that belongs to an alert before. Responses are counted from when the alert
@@ -31,9 +32,14 @@ def operator_csv(run: RecordedTables) -> bytes:
     for name, needed in (("alerts", "an alerting block"), ("decisions", "an operator's console")):
         if name not in run.tables:
             raise UsageError(f"{run.folder}: has no {name}.parquet, which {needed} records")
-    decisions = run.tables["decisions"].to_pylist()
-    taken: set[int] = set()
-    rows = [_alert_row(alert, names, decisions, taken) for alert, names in _alerts(run)]
+    each = [run]
+    if run.has("decisions", "platform"):
+        on = sorted({str(name) for name in run.texts("decisions", "platform")})
+        each = [run.seen_from(name) for name in on] or each
+    rows = []
+    for mine in each:
+        decisions, taken = mine.tables["decisions"].to_pylist(), set[int]()
+        rows += [_alert_row(alert, names, decisions, taken) for alert, names in _alerts(mine)]
     stream = io.StringIO()
     writer = csv.DictWriter(stream, _COLUMNS, lineterminator="\n")
     writer.writeheader()

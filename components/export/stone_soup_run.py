@@ -14,7 +14,7 @@ from stonesoup.types.array import StateVector
 from stonesoup.types.detection import Detection
 from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
-from components.display.recorded_run import OWNSHIP, POSE, RecordedTables
+from components.display.recorded_run import POSE, RecordedTables
 from components.estimation.frame import pose_in_frame, vectors_in_frame
 from components.geometry import north_east_up
 from components.messages.columns import ORIGIN
@@ -107,12 +107,12 @@ def recorded_run(
         (lat, lon, alt), (pose[0], pose[1], pose[2]), (pose[3], pose[4], pose[5]), moves
     )
     paths = {name: _path(name, flight, origin) for name, flight in flights.items()}
-    own = paths.pop(OWNSHIP, None)
+    own = paths.pop(run.own_name, None)
     detector = RecordedDetector()
     detector.looks = list(_looks(run, columns, Poses(position)))
     return StoneSoupRun(
         detector,
-        _platform(columns["time_s"], position, flights.get(OWNSHIP), origin),
+        _platform(run.own_name, columns["time_s"], position, flights.get(run.own_name), origin),
         set(paths.values()),
         own,
         origin,
@@ -153,7 +153,7 @@ def _poses(
     unknown = np.isnan(pose).any(axis=0)
     if not unknown.any():
         return pose
-    if OWNSHIP not in flights:
+    if run.own_name not in flights:
         raise UsageError(
             f"{run.folder}: its detections have no pose of the ownship and there is no "
             "truth.parquet: record one with fusion = fusion.pass_through or truth = true under "
@@ -224,7 +224,11 @@ def _velocity(
 
 
 def _platform(
-    time_s: FloatArray, position: Any, own: Mapping[str, FloatArray] | None, origin: Origin
+    name: str,
+    time_s: FloatArray,
+    position: Any,
+    own: Mapping[str, FloatArray] | None,
+    origin: Origin,
 ) -> MovingPlatform:
     when, first = np.unique(time_s, return_index=True)
     velocity = np.full((3, len(when)), np.nan)
@@ -245,4 +249,4 @@ def _platform(
         velocity_mapping=VELOCITY,
         transition_model=None,
     )
-    return MovingPlatform(movement_controller=movement, id=OWNSHIP)
+    return MovingPlatform(movement_controller=movement, id=name)

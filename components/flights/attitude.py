@@ -213,7 +213,7 @@ def _ratio(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
 
 
 def _hold_yaw(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
-    """Carry the last yaw of a moving sample over those that stand still."""
+    """Give samples without speed the yaw of the last one that moves."""
     if moving.all():
         return yaw
     index = np.arange(len(yaw)).reshape(len(yaw), *(1 for _ in yaw.shape[1:]))

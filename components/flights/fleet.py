@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from components.geometry import TrajectoryState
 from dsa_des.arrays.column_values import constant
-from dsa_des.arrays.growing import Growing
+from dsa_des.arrays.growing_arrays import Growing
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 CELLS_AT_ONCE = 8192
@@ -189,6 +189,63 @@ class LoneFlight(Fleet):
         """Return its states at times (n,), in s."""
         state: TrajectoryState = self._flight.at(time_s)
         return state
+
+
+class MixedFleet(Fleet):
+    """Flights of several kinds, a fleet of each; `makers` make one of flights of a type."""
+
+    def __init__(
+        self, flights: Sequence[Any], makers: Mapping[type, Callable[[Sequence[Any]], Fleet]]
+    ) -> None:
+        self._flights = list(flights)
+        self._fleets: list[Fleet] = []
+        #: Of each flight its fleet, and its index there.
+        self._fleet, self._index = np.zeros((2, len(flights)), dtype=np.int64)
+        kinds = [type(flight) for flight in flights]
+        for kind in dict.fromkeys(kinds):
+            numbers = [number for number, one in enumerate(kinds) if one is kind]
+            of_kind = [flights[number] for number in numbers]
+            make = makers.get(kind)
+            made = [LoneFlight(f) for f in of_kind] if make is None else [make(of_kind)]
+            self._fleet[numbers] = len(self._fleets) + np.arange(len(numbers)) % len(made)
+            self._index[numbers] = np.arange(len(numbers)) // len(made)
+            self._fleets += made
+
+    def __len__(self) -> int:
+        return len(self._flights)
+
+    def __getitem__(self, index: int) -> Any:  # type: ignore[override]
+        return self._flights[index]
+
+    def _parts(self, aircraft: IntArray) -> list[tuple[Fleet, IntArray, IntArray]]:
+        """Return each fleet that is asked, in which rows, and for which of its flights."""
+        fleet = self._fleet[aircraft]
+        asked = np.flatnonzero(np.bincount(fleet, minlength=1)).tolist()
+        rows = [np.flatnonzero(fleet == number) for number in asked]
+        return [
+            (self._fleets[number], row, self._index[aircraft[row]])
+            for number, row in zip(asked, rows, strict=True)
+        ]
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states of flights (n,), each at a time (n,) of its own, in s."""
+        parts = self._parts(aircraft)
+        states = [fleet.each(index, time_s[row]) for fleet, row, index in parts]
+        return assemble_rows([row for _, row, _ in parts], states)
+
+    def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return speeds over ground, asked for as in `each`; NaN where no script says them."""
+        speed_mps = super().ground_speeds_mps(aircraft, time_s)
+        for fleet, row, index in self._parts(aircraft):
+            speed_mps[row] = fleet.ground_speeds_mps(index, time_s[row])
+        return speed_mps
+
+    def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return fixed yaw, pitch and roll (3, n), asked for as in `each`; NaN where not fixed."""
+        fixed_rad = super().fixed_attitudes_rad(aircraft, time_s)
+        for fleet, row, index in self._parts(aircraft):
+            fixed_rad[:, row] = fleet.fixed_attitudes_rad(index, time_s[row])
+        return fixed_rad
 
 
 @dataclass(frozen=True, eq=False)

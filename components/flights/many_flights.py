@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from components.flights.fleet import Fleet, LoneFlight, Trajectory, assemble_rows
+from components.flights.fleet import Fleet, MixedFleet, Trajectory, assemble_rows
 from components.flights.geodesic_motion import geodesic_parameters
 from components.flights.leg_motion import KINDS, ramp_parameters
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
@@ -17,7 +17,7 @@ from components.flights.scripted_flights import MOST_ALT_M, ScriptedFleet, Scrip
 from components.flights.steering_plan import SteeredPart, chords, steered_parts, times_around_s
 from components.geometry import TrajectoryState, heading_from_deg, wrap_longitude_deg
 from components.messages.steering import Manoeuvre
-from dsa_des.arrays.growing import Growing
+from dsa_des.arrays.growing_arrays import Growing
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -246,7 +246,7 @@ class SteeredFleet(Growing, Fleet):
         ramps = ~np.isnan(given[:, _VELOCITY[0]])
         if ramps.any():
             mine, others = ramps.nonzero()[0], (~ramps).nonzero()[0]
-            new = self._ramps(ownship[mine], time_s[mine], given[mine])
+            new = self._fly_ramps(ownship[mine], time_s[mine], given[mine])
             fleet = self._with_parts(ownship[mine], time_s[mine], new, [None] * len(mine))
             if not len(others):
                 return fleet
@@ -266,7 +266,7 @@ class SteeredFleet(Growing, Fleet):
         around = self.each(np.repeat(ownship, times_s.shape[1]), times_s.reshape(-1))
         return around.reshape(times_s.shape)
 
-    def _ramps(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> ScriptedFleet:
+    def _fly_ramps(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> ScriptedFleet:
         """Return what ownships fly from their velocities at times (n,) to commanded ones."""
         _, after, which = self._split_by_manoeuvre(ownship, time_s, None)
         velocity = np.full((2, len(time_s)), np.nan)
@@ -368,60 +368,6 @@ class SteeredFlight:
         return state.reshape(times.shape)
 
 
-class MixedFleet(Fleet):
-    """Flights of several kinds, a fleet of each."""
-
-    def __init__(self, flights: Sequence[Any]) -> None:
-        self._flights = list(flights)
-        self._fleets: list[Fleet] = []
-        #: Of each flight its fleet, and its index there.
-        self._fleet, self._index = np.zeros((2, len(flights)), dtype=np.int64)
-        kinds = [type(flight) for flight in flights]
-        for kind in dict.fromkeys(kinds):
-            numbers = [number for number, one in enumerate(kinds) if one is kind]
-            of_kind = [flights[number] for number in numbers]
-            made = [_FLEETS[kind](of_kind)] if kind in _FLEETS else [LoneFlight(f) for f in of_kind]
-            self._fleet[numbers] = len(self._fleets) + np.arange(len(numbers)) % len(made)
-            self._index[numbers] = np.arange(len(numbers)) // len(made)
-            self._fleets += made
-
-    def __len__(self) -> int:
-        return len(self._flights)
-
-    def __getitem__(self, index: int) -> Any:  # type: ignore[override]
-        return self._flights[index]
-
-    def _parts(self, aircraft: IntArray) -> list[tuple[Fleet, IntArray, IntArray]]:
-        """Return each fleet that is asked, in which rows, and for which of its flights."""
-        fleet = self._fleet[aircraft]
-        asked = np.flatnonzero(np.bincount(fleet, minlength=1)).tolist()
-        rows = [np.flatnonzero(fleet == number) for number in asked]
-        return [
-            (self._fleets[number], row, self._index[aircraft[row]])
-            for number, row in zip(asked, rows, strict=True)
-        ]
-
-    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of flights (n,), each at a time (n,) of its own, in s."""
-        parts = self._parts(aircraft)
-        states = [fleet.each(index, time_s[row]) for fleet, row, index in parts]
-        return assemble_rows([row for _, row, _ in parts], states)
-
-    def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return speeds over ground, asked for as in `each`; NaN where no script says them."""
-        speed_mps = super().ground_speeds_mps(aircraft, time_s)
-        for fleet, row, index in self._parts(aircraft):
-            speed_mps[row] = fleet.ground_speeds_mps(index, time_s[row])
-        return speed_mps
-
-    def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return fixed yaw, pitch and roll (3, n), asked for as in `each`; NaN where not fixed."""
-        fixed_rad = super().fixed_attitudes_rad(aircraft, time_s)
-        for fleet, row, index in self._parts(aircraft):
-            fixed_rad[:, row] = fleet.fixed_attitudes_rad(index, time_s[row])
-        return fixed_rad
-
-
 def _join_flights(flights: Sequence[SteeredFlight]) -> SteeredFleet:
     fleet = flights[0]._fleet
     if all(flight._fleet is fleet for flight in flights):
@@ -440,4 +386,8 @@ def fleet_of(flights: Sequence[Any]) -> Fleet:
     """Return flights of any kinds as a fleet."""
     kinds = {type(flight) for flight in flights}
     kind = next(iter(kinds), ScriptedTrajectory)
-    return _FLEETS[kind](flights) if len(kinds) < 2 and kind in _FLEETS else MixedFleet(flights)
+    return (
+        _FLEETS[kind](flights)
+        if len(kinds) < 2 and kind in _FLEETS
+        else MixedFleet(flights, _FLEETS)
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -69,6 +69,8 @@ class Recording:
         What the file is, in which units it says things, and which height is read.
     callsigns : mapping
         By the names of aircraft, which are addresses.
+    above_sea : sequence of str
+        Whose heights are above mean sea level, as the file says.
     """
 
     problems: Problems
@@ -78,6 +80,7 @@ class Recording:
     units: str = ""
     height: str = ""
     callsigns: Mapping[str, str] = field(default_factory=dict)
+    above_sea: Sequence[str] = ()
 
     def flights(
         self, longest_gap_s: float | None = math.inf, start_s: float | None = None

@@ -30,6 +30,7 @@ _LIMITS = {
 # Where both times count from 1970, days without a flight are nothing odd.
 _LONGEST_SILENCE_S, _LONGEST_OF_DATES_S = 86400.0, 366 * 86400.0
 
+_SEA_LEVEL = re.compile(r"sea[ _]?level|msl", re.IGNORECASE)
 #: A pressure altitude differs by less from a height in the weather of most days.
 _FAR_APART_M = 1000 * FOOT_M
 # Samples closer than this are one instant, written twice.
@@ -197,10 +198,19 @@ class SampleTable:
             return second.header
         return f"{first.header}, of {whom} aircraft {second.header}"
 
+    def _above_sea(self, names: Collection[str]) -> list[str]:
+        """Return which aircraft's heights are above mean sea level, as their column's name says."""
+        second = self._second.get("alt", ())
+        columns = [self._columns.get("alt instead" if name in second else "alt") for name in names]
+        return [
+            name for name, column in zip(names, columns, strict=True)
+            if column is not None and _SEA_LEVEL.search(column.header)
+        ]  # fmt: skip
+
     def recording(self, ownship: str | None, to_geodetic: Converter, **said: Any) -> Recording:
         """Check each aircraft's samples and return them; `said` is what `Recording` says of it."""
         samples = {name: to_geodetic(one) for name, one in self.samples(ownship).items()}
-        said = {"height": self._which("alt"), **said}
+        said = {"height": self._which("alt"), "above_sea": self._above_sea(samples), **said}
         return Recording(self._problems, samples, self.notes, **said)
 
     def finish(self, ownship: str | None, to_geodetic: Converter) -> TrafficFile:

@@ -17,11 +17,7 @@ from components.flights.culling import NearIntervals
 from components.flights.fleet import Fleet, assemble_rows
 from components.flights.many_flights import SteeredFleet
 from components.geometry import TrajectoryState
-from components.messages.steering import Manoeuvre
-from dsa_des.arrays.keyed_table import KeyedTable, turns
-from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.block.wake import Wake
 
 
 class OfEachRun(Fleet):
@@ -295,69 +291,3 @@ class FlownFlights:
         rate = self.rates_hz[run]
         published: FloatArray = np.floor(time_s * rate) / rate
         return published
-
-
-class Coming(KeyedTable):
-    """Manoeuvres that have come: in which run (`replica`), at which `tick`, for which `platform`,
-    and what they are (`manoeuvre`, (fields of `Manoeuvre`, n)).
-    """
-
-    @classmethod
-    def none(cls) -> Coming:
-        """Return none."""
-        types = {"replica": int, "tick": int, "platform": int, "manoeuvre": float}
-        return cls.empty(types, {"manoeuvre": (len(Manoeuvre._fields),)})
-
-    @property
-    def instants(self) -> RunTicks:
-        """When each came."""
-        return RunTicks(self.replica, self.tick)
-
-
-def arrived_manoeuvres(wake: Wake, steers: Mapping[str, int]) -> list[Coming]:
-    """Return the manoeuvres that have come since the last wake; blocks steer which platform."""
-    return [
-        Coming(
-            replica=np.array(new.message.run),
-            tick=new.tick,
-            platform=np.full(len(new.tick), steers[new.source]),
-            manoeuvre=new.message.manoeuvres().T,
-        )
-        for new in wake.arrivals("manoeuvres")
-    ]
-
-
-def due_manoeuvres(wake: Wake, pending: Coming) -> tuple[Coming, Coming]:
-    """Part what has come into what rows of this wake fly, and what is for later ones.
-
-    What comes after the last row is for the next wake: what is flown at the end of a run must not
-    depend on how far a window reached beyond it.
-    """
-    pending = pending.take(np.lexsort((pending.platform, pending.tick, pending.replica)))
-    came = pending.instants
-    row = next_of_run(wake.instants, came)  # the first that flies it, if it is of its ownship
-    due = (row < len(wake)) & (wake.run[np.minimum(row, len(wake) - 1)] == came.run)
-    return pending.take(due), pending.take(~due)
-
-
-def steer(
-    own: SteeredFleet, due: Coming, wake: Wake, run: IntArray
-) -> tuple[SteeredFleet, IntArray]:
-    """Return a platform that flies what has come, and how many manoeuvres each row of runs knows.
-
-    A row knows the manoeuvres that have come by its own instant, whatever came later in this wake.
-    """
-    known: IntArray = own.manoeuvre_count[run]
-    for one in turns(due.replica):  # the first of every run, then the next
-        ownship, ticks = due.replica[one], due.tick[one]
-        own = own.add_manoeuvres(ownship, ticks / wake.ticks_per_s, due.manoeuvre[:, one].T)
-        known = known + _is_at_or_after(run, wake.ticks, ownship, ticks)
-    return own, known
-
-
-def _is_at_or_after(run: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray) -> IntArray:
-    """Return 1 for the rows of some ownships at or after what came for each of them."""
-    order = np.argsort(ownship)
-    index = np.minimum(np.searchsorted(ownship[order], run), len(ownship) - 1)
-    mine = order[index]
-    return ((ownship[mine] == run) & (ticks >= came[mine])).astype(np.int64)

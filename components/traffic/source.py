@@ -13,6 +13,7 @@ from pydantic import Field
 
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.aircraft.known_targets import KnownTraffic
+from components.atmosphere.pressure_altitude import Air, scene_air
 from components.flights.attitude import Wind, scene_wind
 from components.flights.bounds import (
     FlightAt,
@@ -35,24 +36,23 @@ from components.messages.known_flights import KnownFlights
 from components.messages.reach import farthest_look
 from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates, TrueStates
-from components.traffic.flown_flights import (
+from components.traffic.flown_flights import FlightsOfRuns, FlownFlights, WithOthers
+from components.traffic.recorded_truth import truth_is_recorded
+from components.traffic.steering import (
     Coming,
-    FlightsOfRuns,
-    FlownFlights,
-    WithOthers,
     arrived_manoeuvres,
     due_manoeuvres,
     steer,
+    steered_platforms,
 )
-from components.traffic.recorded_truth import truth_is_recorded
-from components.traffic.views import Seen, View
+from components.traffic.views import Seen, views_of
 from components.traffic.wind_effect import ATTITUDE
 from dsa_des.arrays.run_ticks import runs_of_single
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
-from dsa_des.time.clock import ClockSpec
+from dsa_des.time.clock import NANOSECONDS, ClockSpec
 
 
 class SourceParameters(Parameters):
@@ -90,6 +90,7 @@ class TrafficSource(Component):
     windowed = True
     rewindable = True
     clocked = "demand"
+    heeds_changes = True
     hooks = (ATTITUDE,)
 
     own: Trajectory
@@ -108,6 +109,11 @@ class TrafficSource(Component):
     def wind(self) -> Wind | None:
         """The scene's wind, or None."""
         return scene_wind(self.context.sections.get("weather"))
+
+    @property
+    def air(self) -> Air | None:
+        """The scene's air, or None for the standard's."""
+        return scene_air(self.context.sections)
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
@@ -155,11 +161,16 @@ class TrafficSource(Component):
             return replace(envelope, pitch_rad=0.5 * math.pi, roll_rad=math.pi)
         return envelope
 
+    def heed_change(self, from_s: Fraction, other: Any) -> None:
+        """Carry from an instant on what another instance does; all else of aircraft stays."""
+        later = (*self.roster.later, (round(from_s * NANOSECONDS), other.roster))
+        self.roster = replace(self.roster, later=later)
+
     def setup(self) -> None:
         """Learn who looks and is steered, and how far sensors look; what is beyond is not moved."""
         self._check_terrain(self.own.at)
         #: Which platform each block steers.
-        self._steers = self._by_block()
+        self._steers = steered_platforms(self.context.producers, self._index, self.unseen)
         asked: dict[int, list[Any]] = {-1: []}
         for consumer in self.context.consumers:
             asked.setdefault(self._index(consumer.platform), []).append(consumer.request)
@@ -182,26 +193,6 @@ class TrafficSource(Component):
             )
         return names.index(platform)
 
-    def _by_block(self) -> dict[str, int]:
-        """Return which platform each block steers; one that two steer is refused."""
-        steering: dict[int, str] = {}
-        for producer in self.context.producers:
-            index = self._index(producer.platform)
-            if index in self.unseen:
-                raise ValueError(
-                    f"{producer.block} is on {producer.platform!r}, which stands and is not "
-                    "steered: on the way from there to an aircraft a block must say that it is on "
-                    "that one (platform = ...)"
-                )
-            other = steering.setdefault(index, producer.block)
-            if other != producer.block:
-                raise ValueError(
-                    f"{other} and {producer.block} both steer {producer.platform!r}: one block "
-                    f"decides for each aircraft; put one of them on another (platform = ...), or "
-                    "leave its wire out"
-                )
-        return {block: platform for platform, block in steering.items()}
-
     def _flights(self, platforms: Sequence[int]) -> FlownFlights:
         """Return this run's own flights, with the ownship and targets as platforms."""
         return FlownFlights.of(fleet_of([self.own]), self.targets, platforms)
@@ -219,16 +210,7 @@ class TrafficSource(Component):
         steer = sorted(self._steers.values()) if self.context.producers else None
         duration_s = float(self.context.duration_s)
         #: What each platform may look at, the ownship's first.
-        self._views = [
-            View(
-                flights,
-                viewer,
-                look if culls else replace(look, range_m=math.inf),
-                duration_s + look.lasts_s,
-                steer,
-            )
-            for viewer, look in self._looks.items()
-        ]
+        self._views = views_of(flights, self._looks, culls, duration_s, steer)
         self._flown = replace(
             flights,
             crabbing=self.built(ATTITUDE),
@@ -243,7 +225,7 @@ class TrafficSource(Component):
         if terrain is not None and terrain.height_m is not None:
             check_above_terrain(own_at, terrain.height_m, end_s)
         if terrain is not None and terrain.raster is not None:
-            check_on_raster(own_at, terrain.raster.raster, terrain.raster_offset_m, end_s)
+            check_on_raster(own_at, terrain.raster.raster, terrain.raster_zero_m, end_s)
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
@@ -261,11 +243,12 @@ class TrafficSource(Component):
         # What [accuracy] leaves out may rest on what the targets are.
         accuracy = self.context.sections.get("accuracy")
         allows = accuracy is not None and accuracy.model_dump(exclude_none=True)
-        if flights is None or (allows and flights.roster is not self.roster):
+        fixed = allows or self.roster.later
+        if flights is None or (fixed and flights.roster is not self.roster):
             return None
         # A flight into the ground is said of its own replica, by itself.
         for number in range(len(parameters)):
-            self._check_terrain(partial(_one_of, flights.own, number))
+            self._check_terrain(partial(_states_of_one, flights.own, number))
         of_all = copy(self)
         flown = FlownFlights.of(flights.own, flights.targets, [*self._flown.platforms])
         of_all._fly(flown, flights.roster, parameters)
@@ -305,8 +288,8 @@ class TrafficSource(Component):
         flown = self._flown
         seen = Seen(self._views, flown, run, time_s)
         states = self._targets_at(run, seen.columns, time_s)
-        present, culled = seen.by_ownship(states.present)
-        others = seen.by_others(states.present, self.roster.names)
+        present, culled = seen.present_for_ownship(states.present)
+        others = seen.present_for_others(states.present, self.roster.names)
         truth = replace(flown, intervals={}, rates_hz=None, unseen=()) if self.says_truth else None
         asked = any(look.lasts_s > 0.0 for look in self._looks.values())
         return TrafficStates.of(
@@ -420,6 +403,6 @@ class TrafficSource(Component):
         return [*self.sample_times(), *grid]
 
 
-def _one_of(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
+def _states_of_one(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
     """Return the states of one flight of many at times (n,)."""
     return fleet.each(np.full(len(time_s), aircraft), time_s)

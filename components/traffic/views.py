@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -99,6 +100,26 @@ class View:
         return flown.platform_at(-1, run, time_s, state=state) if self.viewer < 0 else None
 
 
+def views_of(
+    flights: FlownFlights,
+    looks: Mapping[int, FarthestLook],
+    culls: bool,
+    duration_s: float,
+    steered: Sequence[int] | None,
+) -> list[View]:
+    """Return what each platform may look at; all the time at everything unless it `culls`."""
+    return [
+        View(
+            flights,
+            viewer,
+            look if culls else replace(look, range_m=math.inf),
+            duration_s + look.lasts_s,
+            steered,
+        )
+        for viewer, look in looks.items()
+    ]
+
+
 class Seen:
     """Who may see whom at the rows of a wake: the ownship first, then the other platforms."""
 
@@ -117,11 +138,11 @@ class Seen:
             viewers = np.array([view.viewer for view in views[1:]])
             self.columns = np.unique(np.concatenate([columns, viewers, *others]))
 
-    def by_ownship(self, there: BoolArray) -> tuple[BoolArray, IntArray | None]:
-        """Return which targets are present for the ownship, and how many are left out."""
-        return self._present(-1, there, self.own.present)
+    def present_for_ownship(self, there: BoolArray) -> tuple[BoolArray, IntArray | None]:
+        """Return which targets the ownship may see at each row, and how many are left out."""
+        return self._present_for(-1, there, self.own.present)
 
-    def by_others(
+    def present_for_others(
         self, there: BoolArray, names: Sequence[str]
     ) -> Mapping[str, tuple[BoolArray, IntArray | None]]:
         """Return the same for the other platforms, by name, with the ownship in their places."""
@@ -130,10 +151,10 @@ class Seen:
             place = int(np.searchsorted(self.columns, view.viewer))
             changed = there.copy()
             changed[:, place] = self.own.present
-            result[names[view.viewer]] = self._present(view.viewer, changed, there[:, place])
+            result[names[view.viewer]] = self._present_for(view.viewer, changed, there[:, place])
         return result
 
-    def _present(
+    def _present_for(
         self, viewer: int, there: BoolArray, looking: BoolArray
     ) -> tuple[BoolArray, IntArray | None]:
         _, columns, near = self._near[viewer]

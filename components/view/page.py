@@ -33,7 +33,7 @@ class RunPicture:
     A sensor has ``name``, ``colour``, ``marker``, and where known ``azimuth_deg`` and ``range_m``;
     of a beam that sweeps clockwise over them ``sweep_s``, how long it takes from each scan on.
     Tables are ``own``, ``truth``, ``scans``, ``detections``, ``fused``, ``tracks``, ``alerts``,
-    ``manoeuvres`` and ``bands``.
+    ``manoeuvres`` and ``bands``. Of several platforms ``eyes`` has what each has, by name.
     """
 
     title: str
@@ -44,11 +44,13 @@ class RunPicture:
     targets: list[str] = field(default_factory=list)
     trackers: list[str] = field(default_factory=list)
     tables: dict[str, dict[str, AnyArray]] = field(default_factory=dict)
+    eyes: "dict[str, RunPicture]" = field(default_factory=dict)
 
     def to_json_tables(self) -> dict[str, Any]:
         """Return it for JSON; columns are little-endian numbers in base 64."""
         tables = {name: _pack(table) for name, table in self.tables.items()}
-        return {**vars(self), "tables": tables}
+        eyes = {name: picture.to_json_tables() for name, picture in self.eyes.items()}
+        return {**vars(self), "tables": tables, "eyes": eyes}
 
 
 def _pack(table: Mapping[str, AnyArray]) -> dict[str, Any]:

@@ -32,7 +32,8 @@ _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
 def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
     """Return the page's picture of a run; `UsageError` where the folder holds none.
 
-    It is what all platforms have, or what one of several has, seen from there.
+    It is what all platforms have, with what each of several has as seen from there, or what one
+    has.
     """
     info = _json(folder / "run.json")
     if "duration_s" not in info:
@@ -43,8 +44,22 @@ def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
     run = RecordedTables(
         folder, {n: read_table(path) for n, path in paths.items() if path.is_file()}
     )
-    carrying = run.carrying
-    first = platform or next(iter(carrying.values()), None)
+    if platform is not None:
+        return _picture_of(run, info, platform)
+    whole, plane = _picture_of(run, info), _plane_of(_Poses(run, run.own_name))
+    each = dict.fromkeys(run.carrying.values())
+    whole.eyes = {on: _picture_of(run, info, on, plane) for on in each}
+    return whole
+
+
+def _picture_of(
+    run: RecordedTables,
+    info: dict[str, Any],
+    platform: str | None = None,
+    plane: TangentPlane | None = None,
+) -> RunPicture:
+    """Return the picture of a run, or of what a platform has of it, in the plane at its start."""
+    folder, carrying, first = run.folder, run.carrying, platform or run.own_name
     if platform is not None:
         run = run.seen_from(platform)
     known = ("truth", "detections", "alerts")
@@ -52,7 +67,7 @@ def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
     targets = {name: number for number, name in enumerate(names)}
     poses = _Poses(run, first)
     own_s, own = poses.of(None)
-    plane = TangentPlane(float(own[0, 0]), float(own[1, 0])) if len(own_s) else _NOWHERE
+    plane = plane or _plane_of(poses)
     sensors = sorted(_texts(run, "scans", "block") | _texts(run, "detections", "block"))
     colours = platform_colours(carrying.values())
     marks = in_colours(block_marks(run.block_types(sensors)), carrying, colours)
@@ -62,8 +77,7 @@ def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
         facts=_facts(info, run.scene) | ({} if platform is None else {"seen from": platform}),
         duration_s=float(info["duration_s"]),
         sensors=[
-            _sensor(name, blocks.get(name, {}), marks[name], carrying.get(name), first)
-            for name in sensors
+            _sensor(name, blocks.get(name, {}), marks[name], carrying.get(name)) for name in sensors
         ],
         targets=names,
     )
@@ -116,13 +130,17 @@ def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
         tables["manoeuvres"] = plain("manoeuvres", "time_s", "turn_rad", "climb_m")
     if "bands" in run.tables:
         columns = ("time_s", "low_rad", "high_rad", "low_m", "high_m")
-        tables["bands"] = {name: run.numbers("bands", name) for name in columns}
+        on = run.texts("bands", "platform") if run.has("bands", "platform") else [first]
+        # They are drawn around who looks, so that those of others are left out.
+        mine = np.array([one == first for one in on], dtype=bool)
+        rows = np.flatnonzero(np.broadcast_to(mine, run.tables["bands"].num_rows))
+        tables["bands"] = {name: run.numbers("bands", name)[rows] for name in columns}
         # Directions of bands are from the north of where the ownship then was.
         pose = _pose_at(own_s, own, tables["bands"]["time_s"])
         turned = np.nan_to_num(plane.turned_rad(pose))
         for name in ("low_rad", "high_rad"):
             tables["bands"][name] = tables["bands"][name] + turned
-        tables["bands"]["region"] = _codes(run.texts("bands", "region"), BAND_REGIONS)
+        tables["bands"]["region"] = _codes(run.texts("bands", "region"), BAND_REGIONS)[rows]
     return picture
 
 
@@ -176,18 +194,14 @@ def _facts(info: dict[str, Any], scene: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in facts.items() if value not in (None, "")}
 
 
-def _sensor(
-    name: str, block: dict[str, Any], mark: Mark, on: str | None, first: str | None
-) -> dict[str, Any]:
+def _sensor(name: str, block: dict[str, Any], mark: Mark, on: str | None) -> dict[str, Any]:
     """Return how a sensor is shown, and its field of view as far as the scene says it.
 
-    `on` is what carries it, where there are several; fields of view are drawn about the `first`.
+    `on` is what carries it, where there are several: about that it is drawn.
     """
     result: dict[str, Any] = {"name": name, "colour": mark.colour, "marker": mark.marker}
     if on is not None:
         result["on"] = on
-    if on != first:
-        return result
     limits = block.get("azimuth_deg")
     if isinstance(limits, list) and len(limits) == 2:
         turned = float(block.get("mount_azimuth_deg", 0.0))
@@ -245,6 +259,12 @@ class _Poses:
             poses = self.of(None if name == self._first else name)
             result[:, mine] = _pose_at(*poses, time_s[mine])
         return result
+
+
+def _plane_of(poses: _Poses) -> TangentPlane:
+    """Return the plane at where the ownship begins."""
+    _, own = poses.of(None)
+    return TangentPlane(float(own[0, 0]), float(own[1, 0])) if own.shape[1] else _NOWHERE
 
 
 def _ownship_columns(

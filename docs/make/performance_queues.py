@@ -11,7 +11,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from components.benchmark.measure import pin
+from components.benchmark.measure import pin_to_one_processor
 from components.benchmark.scenes import CLOCKED
 from components.examples import folder
 from dsa_des.record.arrow import ParquetSink
@@ -85,7 +85,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--repeats", type=int, default=5)
     options = parser.parse_args(arguments)
-    pin()
+    pin_to_one_processor()
     say_json(measured(options.name, options.quick, options.repeats))
     return 0
 

@@ -133,6 +133,43 @@ def take_rows(values: AnyArray, rows: IntArray) -> AnyArray:
     return values.take(rows)
 
 
+def pick_rows(value: Any, rows: slice | IntArray) -> Any:
+    """Return some rows of an array, of a dict of arrays, or of what has `take_rows`."""
+    if value is None:
+        return None
+    if value.__class__ is np.ndarray:  # nearly all are, and looking for a method costs more
+        return value[rows]
+    if isinstance(value, dict):
+        return {key: pick_rows(item, rows) for key, item in value.items()}
+    if hasattr(value, "take_rows"):
+        return value.take_rows(rows)
+    return value[rows]
+
+
+def join_values(values: list[Any], counts: list[int]) -> Any:
+    """Return values of parts of so many rows one after the other; nulls where a part has none."""
+    if {*map(type, values)} == {np.ndarray}:  # nearly all are
+        return np.concatenate(values)
+    known = next((value for value in values if value is not None), None)
+    if known is None:
+        return None
+    if isinstance(known, dict):
+        tables = [value or {} for value in values]
+        names = dict.fromkeys(name for table in tables for name in table)
+        return {name: join_values([table.get(name) for table in tables], counts) for name in names}
+    if hasattr(known, "join_rows"):
+        return type(known).join_rows(values)
+    # What a wire held before the first message may lack columns that real ones have.
+    whole = zip(values, counts, strict=True)
+    return np.concatenate(
+        [_null_values(known, n) if value is None else value for value, n in whole]
+    )
+
+
+def _null_values(like: AnyArray, count: int) -> AnyArray:
+    return np.full(count, np.nan if like.dtype.kind == "f" else 0, dtype=like.dtype)
+
+
 #: Whole numbers that hold the bits of values of so many bytes.
 _BITS = {size: np.dtype(f"u{size}") for size in (1, 2, 4, 8)}
 

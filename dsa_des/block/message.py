@@ -11,10 +11,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from dsa_des.arrays.column_values import Columns, Text, null_column
+from dsa_des.arrays.column_values import Columns, Text, join_values, null_column, pick_rows
 from dsa_des.arrays.entries import entries_of, offsets_of, row_of_entries
 from dsa_des.arrays.run_ticks import RunTicks, concatenate_runs, is_single_run, runs_of_single
-from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
+from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.recorded_columns import (
     PER_ENTRY,
     PER_ROW,
@@ -53,7 +53,6 @@ __all__ = [
 #: Numbers and truth values; no objects, no text.
 _NUMBERS = frozenset("biuf")
 
-_ARRAYS = {np.ndarray}
 #: Row, entry and static fields of every message type seen so far.
 _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {}
 #: What each class records by its fields.
@@ -243,20 +242,20 @@ class Message(_Found):
         result = self._copy()
         values = result.__dict__
         for name in row_names:
-            values[name] = _pick(values[name], rows)
+            values[name] = pick_rows(values[name], rows)
         run = self._runs()
         result.run = runs_of_single(len(result.tick)) if is_single_run(run) else run[rows]
         if entry_names or "offsets" in values:
             values["offsets"], index = entries_of(values["offsets"], rows)
             for name in entry_names:
-                values[name] = _pick(values[name], index)
+                values[name] = pick_rows(values[name], index)
         return result
 
     def reorder(self, order: IntArray) -> Self:
         """Return the message with its entries in another order, each still of its row."""
         result = self._copy()
         for name in _layout(type(self))[1]:
-            setattr(result, name, _pick(getattr(self, name), order))
+            setattr(result, name, pick_rows(getattr(self, name), order))
         return result
 
     def seen_from(self, platform: str) -> Self:
@@ -324,7 +323,7 @@ class Message(_Found):
         result = parts[-1]._copy()
         rows = [len(part) for part in parts]
         for name in row_names:
-            setattr(result, name, _join([*map(attrgetter(name), parts)], rows))
+            setattr(result, name, join_values([*map(attrgetter(name), parts)], rows))
         result.run = concatenate_runs([part._runs() for part in parts])
         if entry_names or hasattr(result, "offsets"):
             offsets = [part.offsets for part in parts]  # type: ignore[attr-defined]
@@ -333,7 +332,7 @@ class Message(_Found):
             result.offsets = np.concatenate([*joined, starts[-1:]])  # type: ignore[attr-defined]
             entries = np.diff(starts).tolist()
             for name in entry_names:
-                setattr(result, name, _join([*map(attrgetter(name), parts)], entries))
+                setattr(result, name, join_values([*map(attrgetter(name), parts)], entries))
         return result
 
     @classmethod
@@ -392,36 +391,3 @@ def _refuse(message: Message, name: str, value: Any, count: int, what: str) -> N
         return
     if value.dtype.kind not in _NUMBERS:
         raise TypeError(f"{said}: numbers are needed")
-
-
-def _pick(value: Any, rows: slice | IntArray) -> Any:
-    if value is None:
-        return None
-    if value.__class__ is np.ndarray:  # nearly all are, and looking for a method costs more
-        return value[rows]
-    if isinstance(value, dict):
-        return {key: _pick(item, rows) for key, item in value.items()}
-    if hasattr(value, "take_rows"):
-        return value.take_rows(rows)
-    return value[rows]
-
-
-def _join(values: list[Any], counts: list[int]) -> Any:
-    if {*map(type, values)} == _ARRAYS:  # nearly all are
-        return np.concatenate(values)
-    known = next((value for value in values if value is not None), None)
-    if known is None:
-        return None
-    if isinstance(known, dict):
-        tables = [value or {} for value in values]
-        names = dict.fromkeys(name for table in tables for name in table)
-        return {name: _join([table.get(name) for table in tables], counts) for name in names}
-    if hasattr(known, "join_rows"):
-        return type(known).join_rows(values)
-    # What a wire held before the first message may lack columns that real ones have.
-    whole = zip(values, counts, strict=True)
-    return np.concatenate([_nothing(known, n) if value is None else value for value, n in whole])
-
-
-def _nothing(like: AnyArray, count: int) -> AnyArray:
-    return np.full(count, np.nan if like.dtype.kind == "f" else 0, dtype=like.dtype)

@@ -153,7 +153,7 @@ def _run_together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Re
         return None
     shared = Shared(sink.tables(), len(scenes), outcome.undone_by_run)
     recorder.sinks.clear()  # what ran refers to itself, and would keep the rows for long
-    parts = _by_replica(shared.tables, len(scenes))
+    parts = _split_by_replica(shared.tables, len(scenes))
     ended = simulation.runs.ended_by
     durations_s = [
         int(tick) / simulation.ticks_per_s if n in ended else outcome.duration_s
@@ -173,7 +173,7 @@ def _run_together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Re
     ]
 
 
-def _by_replica(tables: dict[str, Columns], count: int) -> list[dict[str, Columns]]:
+def _split_by_replica(tables: dict[str, Columns], count: int) -> list[dict[str, Columns]]:
     """Part the rows of a common recording, which are in order of the replica."""
     parts: list[dict[str, Columns]] = [{} for _ in range(count)]
     for table, columns in tables.items():

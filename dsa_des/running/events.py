@@ -1,4 +1,4 @@
-"""SimPy as blocks see it: two events, the state that all of a run share, and the environment.
+"""SimPy as blocks see it: two events, their order, what all of a run share, and the environment.
 
 Both events keep a block's own priority within an instant.
 """
@@ -15,6 +15,20 @@ from dsa_des.block.wake import Wake
 from dsa_des.record.recording import Recorder
 from dsa_des.running.windows import RunningBlock, Window
 from dsa_des.time.runs import Runs
+
+# SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
+WINDOW_PRIORITY = 1.0
+DEPTH_PRIORITY = 1000.0
+# What a block sends later than it is made is there before any block runs.
+LEAVE_PRIORITY = 0.5
+
+
+class Abort(Exception):
+    """Leaves SimPy after a block failed; the failure itself is kept by the simulation.
+
+    SimPy rebuilds an exception from its ``args``, which breaks those that need keywords, so the
+    original never travels through it.
+    """
 
 
 class WakeUp(simpy.Event):

@@ -8,12 +8,13 @@ import simpy
 from dsa_des.block.component import Component, ends_its_run
 from dsa_des.block.message import Message
 from dsa_des.errors import SceneError
-from dsa_des.running.events import RunState
+from dsa_des.running.events import DEPTH_PRIORITY, WINDOW_PRIORITY, RunState
 from dsa_des.running.grain import Grain
 from dsa_des.running.loops import Edge
-from dsa_des.running.node import DEPTH_PRIORITY, WINDOW_PRIORITY, Demand, Node
+from dsa_des.running.node import Node
 from dsa_des.running.processors import Processor, Service
 from dsa_des.running.timeline import Timeline
+from dsa_des.running.windows import Demand
 from dsa_des.scene.graph import depths, queue_key
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire

@@ -24,8 +24,8 @@ from dsa_des.record.recording import NotRecordedError, Recorder
 from dsa_des.record.undone import Undone, UndoneByRun, sum_runs
 from dsa_des.running.assembly import Assembly
 from dsa_des.running.effects import Planned, WrapEffect, timing_plan
+from dsa_des.running.events import Abort
 from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
-from dsa_des.running.node import Abort
 from dsa_des.running.nodes import (
     build_nodes,
     build_processors,
@@ -123,8 +123,8 @@ class Simulation:
             scene, timeline, recorder, simulate_everything, wrap_effect, grain.rewinds
         )
         self.components: Mapping[str, Component] = assembly.components
-        #: What carries each block, where blocks are on several platforms; else nothing.
-        self.platforms = assembly.platforms if len(set(assembly.platforms.values())) > 1 else {}
+        #: What carries each block; nothing where one carries all, and that is the first of all.
+        self.platforms = assembly.platforms if assembly.is_shared else {}
         #: The blocks of each stretch of time between two changes, and what became of their effects.
         self.stretches, self.plans = assembly.stretches, assembly.plans
         self.unheard = assembly.unheard

@@ -35,6 +35,17 @@ def test_an_alert_lasts_until_the_alerting_looks_again(alerted):
     ]  # fmt: skip
 
 
+def test_an_alert_goes_on_while_another_block_looks(tmp_path):
+    """Two that look in turn, half a second apart, of which each knows one target."""
+    rows = [(t + late, name, of, 2) for t in (0.0, 1.0, 2.0)
+            for late, name, of in ((0.0, "one", "a"), (0.5, "two", "b"))]  # fmt: skip
+    time_s, block, target, level = map(list, zip(*rows, strict=True))
+    columns = {"time_s": time_s, "block": block, "target": target, "level": level}
+    pq.write_table(pa.table(columns), tmp_path / "alerts.parquet")
+    found = Alerted.read(tmp_path).stretches
+    assert found == {"a": [(2, 0.0, 3.0)], "b": [(2, 0.5, 3.5)]}
+
+
 def test_lines_are_thicker_where_there_is_an_alert(alerted):
     axes = Figure().add_subplot()
     time_s = np.array([0.0, 2.0, 10.0])

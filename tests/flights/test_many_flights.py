@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from components.flights.legs import Straight, Turn
-from components.flights.many_flights import MixedFleet, SteeredFlight
+from components.flights.many_flights import SteeredFlight, fleet_of
 from components.flights.sampled_flight import SampledTrajectory
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.messages.steering import Manoeuvre
@@ -75,7 +75,7 @@ def test_flights_of_all_kinds_are_asked_together():
     flights = [sampled[0], *steered, scripted[1], Still(sampled[1]), sampled[1], scripted[0]]
     rng = np.random.default_rng(2)
     which, time_s = rng.integers(0, len(flights), 300), rng.uniform(0.0, 40.0, 300)
-    found = MixedFleet(flights).each(which, time_s)
+    found = fleet_of(flights).each(which, time_s)
     for k, flight in enumerate(flights):
         rows = which == k
         same(type(found)(*(part[rows] for part in found.arrays())), flight.at(time_s[rows]))
@@ -90,7 +90,7 @@ def test_a_fleet_of_all_kinds_says_what_scripts_fix():
     fast = ScriptedTrajectory("fast", **start, speed_mps=70.0)
     up = Manoeuvre(climb_m=90.0, climb_rate_mps=5.0)
     steered = SteeredFlight(slow).add_manoeuvre(3.0, up)
-    found = MixedFleet([fast, Still(fast), steered, sampled, slow])
+    found = fleet_of([fast, Still(fast), steered, sampled, slow])
     which, time_s = np.array([2, 4, 0, 3, 1, 2]), np.array([2.0, 9.0, 9.0, 9.0, 9.0, 5.0])
     nan = np.nan
     np.testing.assert_allclose(

@@ -9,6 +9,8 @@ import dsa_des
 from components.cdti.scope import Scope
 from components.display.alerted import Alerted
 from components.display.outcomes import carried_blocks
+from components.display.picture import held_positions
+from components.display.recorded_run import tables_of
 from components.display.symbols import in_colours, platform_colours, styles_of
 from components.view.run_picture import run_picture
 from dsa_des.embed import Simulator
@@ -64,12 +66,12 @@ def test_a_page_shows_what_each_has_where_it_is(folder):
 
 
 def test_sensors_have_the_colour_of_what_carries_them(scene, folder):
-    """Fields of view are drawn about who looks, so that those of others are left out."""
+    """And fields of view, which are drawn about that."""
     whole, theirs = run_picture(folder), run_picture(folder, "b")
     (mine, other), (alone,) = whole.sensors, theirs.sensors
     assert (mine["on"], other["on"], alone["on"]) == ("ownship", "b", "b")
     assert mine["colour"] != other["colour"] == alone["colour"]
-    assert "range_m" in mine and "range_m" not in other and "range_m" in alone
+    assert mine["range_m"] == other["range_m"] == alone["range_m"] == 9000.0
     simulation = Simulation(scene)
     carrying = carried_blocks(simulation)
     assert list(platform_colours(carrying.values())) == ["ownship", "b"]
@@ -117,3 +119,41 @@ def test_a_host_is_what_carries_a_chain():
     assert found[0].detected == pytest.approx(found[1].detected, rel=0, abs=0)
     with pytest.raises(dsa_des.SceneError, match="carried by 'bb'; did you mean 'b'"):
         Simulator(dsa_des.load_scene(tables), platform="bb")
+
+
+#: In the south, banked, across the date line; none is called ownship, and a site is first by name.
+ZULU = {"name": "zulu", "lat_deg": -41.3, "lon_deg": 179.98, "alt_m": 2200, "heading_deg": 217,
+        "speed_mps": 70, "roll_deg": -20, "pitch_deg": 6}  # fmt: skip
+BRAVO = {"name": "bravo", "lat_deg": -41.33, "lon_deg": 179.93, "alt_m": 2230, "heading_deg": 60,
+         "speed_mps": 60, "roll_deg": 15}  # fmt: skip
+SITE = {"name": "airport", "lat_deg": -41.35, "lon_deg": 179.95, "alt_m": 30, "yaw_deg": 30}
+
+
+@pytest.mark.parametrize("own", [{}, {"": None}], ids=["carries nothing", "carries a chain"])
+def test_tracks_go_out_to_other_programs_from_where_they_were_measured(own):
+    """By the truth and pymap3d: what is measured to a metre ends where the target was."""
+    exact = SURE_RADAR | {"range_km": 20, "errors": "stated", "quantised": False}
+    exact |= {"azimuth_error_deg": 1e-3, "elevation_error_deg": 1e-3, "range_error_m": 1}
+    chains = own | {"_b": "bravo", "_s": "airport"}
+    tables = scene_of(ZULU, [BRAVO], chains, radar=exact, duration_s=5).resolved()
+    tables["blocks"]["traffic"]["sites"] = [SITE]
+    blocks = [name for name in tables["blocks"] if name.startswith(("alerting", "decider"))]
+    for name in blocks:
+        del tables["blocks"][name]
+    tables["wires"] = [w for w in tables["wires"] if not any(name in str(w) for name in blocks)]
+    run = tables_of(dsa_des.run(dsa_des.load_scene(tables)))
+    assert run.own_name == "zulu" and next(iter(run.flights())) == "zulu"
+    rows, places = held_positions(run)
+    about = np.array([run.texts("tracks", name) for name in ("block", "target")])[:, rows].T
+    seen = {"tracker": {"bravo"}, "tracker_b": {"zulu"}, "tracker_s": {"zulu", "bravo"}}
+    assert {(a, b) for a, b in about.tolist()} == {
+        (f"tracker{suffix}", name) for suffix in chains for name in seen[f"tracker{suffix}"]
+    }
+    for (_, target), when_s, place in zip(
+        about.tolist(), run.numbers("tracks", "measured_s")[rows], places.T, strict=True
+    ):
+        flown = run.flights()[target]
+        at = int(np.flatnonzero(flown["time_s"] == when_s)[0])
+        true = [flown[name][at] for name in ("lat_deg", "lon_deg", "alt_m")]
+        apart = np.subtract(pymap3d.geodetic2ecef(*place), pymap3d.geodetic2ecef(*true))
+        assert np.linalg.norm(apart) < 10.0

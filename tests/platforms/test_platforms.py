@@ -238,8 +238,11 @@ def test_tables_say_on_which_platform_a_block_is_where_there_are_several():
         (kind,) = kinds
         on = {(kind, "ownship"), (f"{kind}_b", "b")}
         assert rows == ({("traffic", None)} if kind == "traffic" else on)
+    # And where all are on one that is not the ownship, whose poses would be another's.
     alone = tables_of(scene_of(OWN, [B], {"_b": "b"}, duration_s=5))[1]
-    assert not any("platform" in table.column_names for table in alone.values())
+    assert {*alone["scans"]["platform"].to_pylist()} == {"b"}
+    own = tables_of(scene_of(OWN, [B], {"": None}, duration_s=5))[1]
+    assert not any("platform" in table.column_names for table in own.values())
 
 
 def test_a_platform_that_was_forgotten_and_a_chain_that_ends_in_nothing_are_noted():

@@ -222,3 +222,23 @@ def test_each_detection_of_turned_radars_has_its_own_instant_and_errors():
     assert not told and len(looks) == 3 and looks[0] == START < looks[1] < looks[2]
     first, second = (row["azimuth_variance_rad2"] for row in rows(one, block="still"))
     assert abs(first / second - 1.0) > 0.1
+
+
+def test_of_several_platforms_it_is_what_one_has():
+    """Its looks alone, from where it is, and the ownship among the targets."""
+    tables = scene()
+    tables["blocks"] |= {"there": {"type": "geometry.ellipsoid", "platform": "rolling"},
+                         "other": RADAR, "mixed": {"type": "fusion.pass_through"}}  # fmt: skip
+    tables["wires"] = [*tables["wires"], "traffic -> there -> other -> mixed"]
+    two = run(tables)
+    mine, theirs = stone_soup(two), stone_soup(two, platform="rolling")
+    for of, sensors, called, others in (
+        (mine, {"radar", "camera"}, "ownship", {"rolling", "diving"}),
+        (theirs, {"other"}, "rolling", {"ownship", "diving"}),
+    ):
+        found = {d.metadata["sensor"] for _, looked in of.detector for d in looked}
+        assert found == sensors and of.platform.id == of.ownship.id == called
+        assert {path.id for path in of.truth} == others
+        at = START + timedelta(seconds=1)
+        places = [np.array(one[at].state_vector, dtype=float) for one in (of.platform, of.ownship)]
+        np.testing.assert_allclose(*places, atol=1e-6)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pyarrow.parquet as pq
+import pymap3d
 import pytest
 from click.testing import CliRunner
 
@@ -12,6 +13,7 @@ from tests.support.waiting import WAIT_S
 from tests.view.test_page import SCENE, luminance
 
 FADE_S = 4.0
+PLACE = ("lat_deg", "lon_deg", "alt_m")
 
 
 @pytest.fixture(scope="module")
@@ -210,4 +212,39 @@ def test_the_beam_looks_at_a_target_when_it_lights_it(browser, tmp_path):
         opened.evaluate("t => App.seek(t)", row["illuminated_s"])
         (beam,) = opened.evaluate("App.state().beams")
         assert beam["azimuth_deg"] == pytest.approx(np.degrees(row["azimuth_rad"]), abs=1.5)
+    opened.close()
+
+
+def test_the_page_of_several_shows_what_each_has_through_its_eyes(browser, tmp_path):
+    """Fields of view stand at what carries the sensors; chosen in the browser, one has the page."""
+    scene = dsa_des.load_scene(folder() / "platforms" / "one_is_blind.toml", sets=["duration_s=20"])
+    dsa_des.run(scene, out=tmp_path / "run")
+    assert CliRunner().invoke(view, [str(tmp_path / "run")]).exit_code == 0
+    opened, wrong = browser.new_page(), []
+    opened.on("pageerror", lambda error: wrong.append(str(error)))
+    opened.goto(f"file://{tmp_path / 'run.html'}#t=10")
+    truth = {row["target"]: row for row in rows(tmp_path / "run", "truth", 9.999, 10)}
+    place = "Data.carrier(Data.sensors.find((one) => one.name === 'radar_b'), 10)"
+
+    def there():
+        found = opened.evaluate(place)
+        return found["east"], found["north"], found["alt"]
+
+    east, north, _ = pymap3d.geodetic2enu(*(truth["other"][name] for name in PLACE), 52.0, 4.4, 0.0)
+    assert there() == pytest.approx((east, north, truth["other"]["alt_m"]), abs=5.0)
+    own = opened.evaluate("Data.ownship(10)")
+    assert {d["sensor"] for d in opened.evaluate("App.state()")["detections"]} == {"radar"}
+    opened.select_option("#eyes", label="other")
+    opened.wait_for_function("() => window.App && Data.eyes === 'other'", timeout=1000 * WAIT_S)
+    assert opened.url.endswith("#t=10&eyes=other")
+    assert (opened.evaluate("App.state().t"), opened.evaluate("Data.targets")) == (10, ["ownship"])
+    assert there() == pytest.approx((east, north, truth["other"]["alt_m"]), abs=5.0)
+    seen = opened.evaluate("App.state()")
+    assert seen["own"]["east"] == pytest.approx(east, abs=5.0)
+    assert (seen["truth"][0]["east"], seen["truth"][0]["north"]) == pytest.approx(
+        (own["east"], own["north"]), abs=5.0
+    )
+    opened.select_option("#eyes", label="all")
+    opened.wait_for_function("() => window.App && Data.eyes === null", timeout=1000 * WAIT_S)
+    assert wrong == []
     opened.close()

@@ -108,15 +108,22 @@ const App = (() => {
     requestAnimationFrame(frame);
   }
 
+  const page = Data.page;
+  function address(eyes) {
+    const looks = eyes === null ? "" : `&eyes=${encodeURIComponent(eyes)}`;
+    return `#t=${+(state.t + Data.start_s).toFixed(6)}${options.headingUp ? "&up=heading" : ""}${looks}`;
+  }
   function link() {
-    const hash = `#t=${+(state.t + Data.start_s).toFixed(6)}${options.headingUp ? "&up=heading" : ""}`;
+    const hash = address(Data.eyes);
     page.history.replaceState(null, "", hash);
     get("note").textContent = `address ends in ${hash}`;
     if (navigator.clipboard) navigator.clipboard.writeText(page.location.href).catch(() => {});
   }
-  // Pages beside each other stand in one, whose address it is.
-  const page = window.frameElement ? window.parent : window;
   function readLink() {
+    if (Data.chosenEyes() !== Data.eyes) {
+      page.location.reload();
+      return;
+    }
     const parts = new URLSearchParams(page.location.hash.slice(1));
     const t = Number(parts.get("t"));
     if (parts.has("t") && Number.isFinite(t)) {
@@ -164,6 +171,11 @@ const App = (() => {
   }
   get("steps").add(new Option("all shown", "-1", true, true));
   Data.sensors.forEach((s, n) => get("steps").add(new Option(s.name, String(n))));
+  for (const name of ["all", ...Data.platforms]) {
+    const mine = name === (Data.eyes ?? "all");
+    get("eyes").add(new Option(name, name, mine, mine));
+  }
+  get("eyes").parentElement.hidden = Data.platforms.length === 0;
   document.querySelector("h1").title = document.title;
   get("facts").title = get("facts").textContent = Object.entries(Data.facts)
     .map(([k, v]) => (k === "description" ? v : `${k} ${v}`)).join(" · ");
@@ -178,6 +190,9 @@ const App = (() => {
   for (const [id, act] of Object.entries(press)) get(id).addEventListener("click", act);
   get("speed").addEventListener("change", (e) => tell("speed", Number(e.target.value)));
   get("steps").addEventListener("change", (e) => { state.steps = Number(e.target.value); });
+  get("eyes").addEventListener("change", (e) => {
+    page.location.hash = address(e.target.selectedIndex ? e.target.value : null);
+  });
   get("time").addEventListener("change", (e) => {
     const t = Number(e.target.value);
     if (Number.isFinite(t)) { play(false); seek(t - Data.start_s); }

@@ -1,7 +1,15 @@
 "use strict";
 // The run's columns, and what they say of an instant. Times are seconds since the start.
 const Data = (() => {
-  const raw = JSON.parse(document.getElementById("data").textContent);
+  const whole = JSON.parse(document.getElementById("data").textContent);
+  // Pages beside each other stand in one, whose address says with whose eyes of several one looks.
+  const page = window.frameElement ? window.parent : window;
+  function chosenEyes() {
+    const named = new URLSearchParams(page.location.hash.slice(1)).get("eyes");
+    return named !== null && Object.hasOwn(whole.eyes, named) ? named : null;
+  }
+  const eyes = chosenEyes();
+  const raw = eyes === null ? whole : whole.eyes[eyes];
 
   function column(packed) {
     const text = atob(packed.data);
@@ -11,12 +19,14 @@ const Data = (() => {
     return new kinds[packed.kind](bytes.buffer);
   }
 
-  const tables = {};
-  for (const [name, packed] of Object.entries(raw.tables)) {
-    tables[name] = {};
-    for (const [key, values] of Object.entries(packed)) tables[name][key] = column(values);
-    tables[name].count = Object.values(tables[name])[0].length;
+  function unpacked(packed) {
+    const table = {};
+    for (const [key, values] of Object.entries(packed)) table[key] = column(values);
+    table.count = Object.values(table)[0].length;
+    return table;
   }
+  const tables = {};
+  for (const [name, packed] of Object.entries(raw.tables)) tables[name] = unpacked(packed);
 
   // Number of elements in [from, to) that are not above a value, as the place of the next one.
   function after(values, value, from = 0, to = values.length) {
@@ -37,14 +47,20 @@ const Data = (() => {
     return columns.map((c) => c[last] + part * (c[next] - c[last]));
   }
 
-  const own = tables.own;
-  const ownColumns = own ? [own.east_m, own.north_m, own.alt_m, own.heading_rad] : [];
-  function ownship(t) {
+  function poseAt(own, t) {
     if (!own || own.count === 0) return { east: 0, north: 0, alt: 0, heading: 0, known: false };
+    const columns = [own.east_m, own.north_m, own.alt_m, own.heading_rad];
     const inside = Math.min(Math.max(t, own.time_s[0]), own.time_s[own.count - 1]);
-    const at = between(own.time_s, ownColumns, inside, 0, own.count);
+    const at = between(own.time_s, columns, inside, 0, own.count);
     return { east: at[0], north: at[1], alt: at[2], heading: at[3], known: true };
   }
+  const ownship = (t) => poseAt(tables.own, t);
+  // Where what carries a sensor is.
+  const carriers = new Map();
+  if (eyes === null) {
+    for (const [name, one] of Object.entries(whole.eyes)) carriers.set(name, unpacked(one.tables.own));
+  }
+  const carrier = (sensor, t) => poseAt(carriers.get(sensor.on) || tables.own, t);
 
   const spans = [];
   if (tables.truth) {
@@ -226,7 +242,8 @@ const Data = (() => {
 
   const near_m = nearReach();
   return {
-    ...raw, tables, trackers, after, ownship, truths, recent, latest, standing, alertsAt, trackName, bandsAt,
+    ...raw, page, eyes, chosenEyes, platforms: Object.keys(whole.eyes),
+    tables, trackers, after, ownship, carrier, truths, recent, latest, standing, alertsAt, trackName, bandsAt,
     looks, scanTimes, reach: { near_m, first_s: firstWithin(near_m) },
     scanDetected: scans.map((rows) => Int32Array.from(rows, (i) => tables.scans.detected[i])),
   };

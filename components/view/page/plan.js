@@ -60,10 +60,11 @@ const Plan = (() => {
     }
   }
 
-  function fields(c, own, shown) {
-    const [x, y] = place(own.east, own.north);
+  function fields(c, t, shown) {
     Data.sensors.forEach((sensor, number) => {
       if (!shown.has(number) || !sensor.azimuth_deg) return;
+      const own = Data.carrier(sensor, t);
+      const [x, y] = place(own.east, own.north);
       const [low, high] = sensor.azimuth_deg.map((deg) => (deg * Math.PI) / 180);
       const around = high - low >= 2 * Math.PI - 1e-6;
       const far = view.perPixel * Math.hypot(view.width, view.height);
@@ -89,8 +90,9 @@ const Plan = (() => {
   }
 
   // Where a sweeping beam looks: clockwise over the field of view, once from each scan on.
-  function beam(c, t, own, number, drawn) {
+  function beam(c, t, number, drawn) {
     const sensor = Data.sensors[number], times = Data.scanTimes[number];
+    const own = Data.carrier(sensor, t);
     const last = Data.after(times, t) - 1;
     if (!sensor.sweep_s || !sensor.azimuth_deg || last < 0) return;
     const part = (t - times[last]) / sensor.sweep_s;
@@ -291,8 +293,8 @@ const Plan = (() => {
     const step = rings(c, own);
     drawn.beams = [];
     if (options.fields) {
-      fields(c, own, options.sensors);
-      for (const number of options.sensors) beam(c, t, own, number, drawn);
+      fields(c, t, options.sensors);
+      for (const number of options.sensors) beam(c, t, number, drawn);
     }
     if (options.bands) bands(c, t, own, drawn);
     if (options.truth) truth(c, t, own, drawn);
