@@ -399,7 +399,7 @@ def test_a_clock_of_whole_seconds_says_several_places_of_each(tmp_path):
 
 
 def test_days_of_silence_are_a_gap_where_times_are_dates(tmp_path):
-    text = "time,id,lat,lon,alt\n{0},a,47,8,1000\n{1},a,47,8,1000\n{2},a,47,8,1000\n{3},a,48,8,1000\n"
+    text = "time,id,lat,lon,alt\n" + "".join(f"{{{k}}},a,47,8,1000\n" for k in range(4))
     path = tmp_path / "t.csv"
     for begins, days, taken in ((1.7e9, 40, True), (1.7e9, 400, False), (5.0, 2, False)):
         path.write_text(text.format(*(begins + k for k in (0, 1, 2, 86400 * days))))
