@@ -68,7 +68,7 @@ def _rows_of(document: Any) -> Iterable[Any]:
     """Return the records of a document: one, or columns as pandas writes them."""
     if isinstance(document, dict):
         columns, rows = document.get("columns"), document.get("data")
-        if columns is not None and hasattr(rows, "__iter__"):
+        if columns is not None and isinstance(rows, Iterable):
             return (dict(zip(map(str, columns), row, strict=False)) for row in rows)
         first = next(iter(document.values()), None)
         if first and all(isinstance(one, dict) for one in document.values()):

@@ -168,7 +168,8 @@ def _of_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -> 
                 tracks[name] = tracks.get(name, 0) + 1
             called = name if tracks.get(name, 0) < 2 else f"{name} {tracks[name]}"
             for k, one in enumerate(whens):
-                yield called, odd.get(k, one), *coords[3 * k : 3 * k + 3]
+                lon, lat, up = coords[3 * k : 3 * k + 3]
+                yield called, odd.get(k, one), lon, lat, up
         elif tag == "Placemark" and point and when:
             name = names.get(_document(inside)) or stem
             yield name, _instant(when), *_three(point.split(","))
