@@ -149,9 +149,11 @@ def _of_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -> 
                 warnings.append(f"{said} and are read as above mean sea level")
         elif tag == "when" and parent == "Track":
             time_s = _instant(text)
-            if not isinstance(time_s, float):
-                time_s, odd[len(whens)] = math.nan, time_s
-            whens.append(time_s)
+            if isinstance(time_s, float):
+                whens.append(time_s)
+            else:
+                odd[len(whens)] = time_s
+                whens.append(math.nan)
         elif tag == "coord":
             coords.extend(_three(text.split()))
         elif tag == "when":
