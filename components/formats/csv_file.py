@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
-from itertools import chain, islice
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 
@@ -36,9 +35,11 @@ from components.formats.text_rows import (
     TrafficFile,
     did_you_mean,
     each_line,
+    quoted_rows,
     read_content,
     shown_columns,
     text_of,
+    without_frame,
 )
 
 _GEOMETRIC = ("geoaltitude", "altgeom", "geomaltitude", "geometricaltitude", "gnssaltitude")
@@ -147,11 +148,11 @@ def record_table(
     """Return the aircraft of a table, see `read_csv`: two or more, or any, called as its `stem`
     where there is no column of names.
     """
-    (header_line, header_text), body = _header_and_rows(problems, _unframed(lines))
+    (header_line, header_text), body = _header_and_rows(problems, without_frame(lines))
     header_text = header_text.lstrip("#").strip(" ")
     delimiter = next((d for d in (",", ";", "\t", "|") if d in header_text), " ")
-    ((_, headers),) = _rows(iter([(header_line, header_text)]), delimiter)
-    rows = _rows((one for one in body if not one[1].startswith("#")), delimiter)
+    ((_, headers),) = quoted_rows(iter([(header_line, header_text)]), delimiter)
+    rows = quoted_rows((one for one in body if not one[1].startswith("#")), delimiter)
     return record_rows(problems, headers, header_line, rows, ownship, altitude, stem)
 
 
@@ -285,23 +286,6 @@ def _seem_feet(recording: Recording) -> bool:
     return steps and len(heights) >= _FEW_HEIGHTS and bool(np.any(heights % 100.0))
 
 
-#: A line of the frame of a table, and how far from the first line one must be.
-_FRAME, _HEAD = re.compile(r"[+|]?-[-+]+-[+|]?"), 30
-
-
-def _unframed(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-    """Give the rows of a table that a shell drew (Impala's, Trino's), its names once."""
-    head = list(islice(lines, _HEAD))
-    names = ""
-    if not any(_FRAME.fullmatch(text) for _, text in head):
-        yield from chain(head, lines)
-        return
-    for number, text in chain(head, lines):
-        if "|" in text and not _FRAME.fullmatch(text) and text != names:
-            names = names or text
-            yield number, text.strip("|")
-
-
 _KNOWN_NAMES = frozenset(_IDENTITIES)
 _KNOWN = {name for spec in COLUMNS.values() for name in spec.names}
 
@@ -332,30 +316,6 @@ def _header_and_rows(
         elif not one[1].lower().startswith("sep="):
             return one, lines
     problems.fail("the file is empty: a row of column names and rows of samples are needed")
-
-
-def _rows(lines: Iterator[tuple[int, str]], delimiter: str) -> Iterator[tuple[int, list[str]]]:
-    """Return each row's cells and the line where it begins; a quoted cell may go over several."""
-    if delimiter == " ":
-        yield from ((number, text.split()) for number, text in lines)
-        return
-    begun: list[int] = []
-
-    def fed() -> Iterator[str]:
-        for number, text in lines:
-            begun.append(number)
-            yield text + "\n"
-
-    reader = csv.reader(fed(), delimiter=delimiter)
-    while True:
-        begun.clear()
-        try:
-            row = next(reader, None)
-        except csv.Error:  # a cell of over 131,072 characters: no row of ours
-            row = []
-        if row is None:
-            return
-        yield begun[0], [cell.strip() for cell in row]
 
 
 def _single_position(headers: list[str]) -> int | None:

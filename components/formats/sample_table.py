@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from array import array
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
@@ -12,7 +11,17 @@ import numpy as np
 
 from components.arguments.units import FOOT_M
 from components.formats.recording import ReadingNotes, Recording, rename_duplicates
-from components.formats.sample_columns import EPOCH_S, SampleColumn, is_missing
+from components.formats.sample_columns import (
+    EPOCH_S,
+    ONE_IN,
+    GrowingColumns,
+    SampleColumn,
+    are_of_one_second,
+    fill_gaps,
+    is_missing,
+    number_of,
+    take_rows,
+)
 from components.formats.text_rows import MOST_OF_A_CELL, MOST_PROBLEMS, Problems, TrafficFile
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.text.safe_text import shorten
@@ -35,51 +44,12 @@ _SEA_LEVEL = re.compile(r"sea[ _]?level|msl", re.IGNORECASE)
 _FAR_APART_M = 1000 * FOOT_M
 # Samples closer than this are one instant, written twice.
 _SHORTEST_STEP_S = 1e-6
-#: At most one of so many samples may be at the instant of another, or lack an optional number that
-#: the nearest sample has within so many seconds: more is no slip of a recorder.
-_ONE_IN, _NEAR_S = 10, 5.0
-#: However many, they are one aircraft's by a clock of whole seconds, where no two are further apart
-#: than this.
-_OF_A_SECOND = {"lat": 0.0008, "lon": 0.0008, "alt": 50.0}
 #: Who is further from 0° N 0° E at some time is not there where only zeros stand, deg.
 _NEAR_0_DEG = 1.0
 #: What a row lacks that is left out; all other needed columns are its position.
 _LACKS = {"time": "time", "alt": "height"}
 
 Converter = Callable[[dict[str, FloatArray]], dict[str, FloatArray]]
-
-
-class _Rows:
-    """The samples of one aircraft as they come; a column begins with its first number."""
-
-    def __init__(self, quantities: Collection[str]) -> None:
-        self.lines = array("I")
-        self.values: dict[str, array[float]] = {}
-        self._unseen = list(enumerate(quantities))
-        self._appends: list[tuple[int, Callable[[float], None]]] = []
-
-    def add(self, line: int, numbers: Sequence[float]) -> None:
-        """Add a sample of numbers in the order of the quantities, NaN where there is none."""
-        for k, quantity in [one for one in self._unseen if numbers[one[0]] == numbers[one[0]]]:
-            self._unseen.remove((k, quantity))
-            column = self.values[quantity] = array("d", [math.nan]) * len(self.lines)
-            self._appends.append((k, column.append))
-        self.lines.append(line)
-        for k, append in self._appends:
-            append(numbers[k])
-
-
-def _number(value: Any) -> float:
-    """Return a number; NaN for what is none, ``"ground"`` for an altitude say."""
-    if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 2**62:
-        return math.nan
-    return float(value)
-
-
-def _take(columns: dict[str, FloatArray], rows: Any) -> None:
-    """Keep some rows of columns, one column after the other: two are there twice at no time."""
-    for key in columns:
-        columns[key] = columns[key][rows]
 
 
 class SampleTable:
@@ -121,7 +91,7 @@ class SampleTable:
         self._needed = columns.keys() - self._optional - {*self._instead.values()}
         self._problems, self._name_column, self._columns = problems, name_column, columns
         self._parse_time, self._gaps = parse_time, gaps
-        self._aircraft: dict[str, _Rows] = {}
+        self._aircraft: dict[str, GrowingColumns] = {}
         self.notes = ReadingNotes()
         self._apart: dict[str, list[tuple[float, str]]] = {}
         self._second: dict[str, list[str]] = {}
@@ -147,7 +117,7 @@ class SampleTable:
             self._problems.add("the aircraft has no name", line=line)
             return
         # An aircraft counts as named even if its row is bad: it is there, only not usable.
-        rows = self._aircraft.get(name) or self._aircraft.setdefault(name, _Rows(self._columns))
+        rows = self._rows_of(name)
         numbers: list[float] = []
         whole = True
         for quantity, index, factor, low, high in self._plan:
@@ -165,13 +135,13 @@ class SampleTable:
 
     def add_numbers(self, line: int, name: str, values: Sequence[Any]) -> None:
         """Add a sample of values in the order of the columns, of which some are no numbers."""
-        rows = self._aircraft.get(name) or self._aircraft.setdefault(name, _Rows(self._columns))
+        rows = self._rows_of(name)
         if not name:
             self._problems.add("the aircraft has no name", line=line)
             return
         numbers: list[float] = []
         for (quantity, _, _, low, high), value in zip(self._plan, values, strict=True):
-            number = value if type(value) is float else _number(value)
+            number = value if type(value) is float else number_of(value)
             if not low <= number <= high:
                 if quantity not in self._optional and math.isfinite(number):
                     self._number(line, quantity, self._columns[quantity], repr(number))
@@ -179,6 +149,11 @@ class SampleTable:
                 number = math.nan
             numbers.append(number)
         rows.add(line, numbers)
+
+    def _rows_of(self, name: str) -> GrowingColumns:
+        if name not in self._aircraft:
+            self._aircraft[name] = GrowingColumns(self._columns)
+        return self._aircraft[name]
 
     def _unusual(self, line: int, quantity: str, cell: str) -> float | None:
         """Return what a cell means that is no plain number: NaN for none, None for a problem."""
@@ -281,7 +256,7 @@ class SampleTable:
             if not there.all():
                 left_out += int(np.count_nonzero(~there))
                 lines = lines[there]
-                _take(columns, there)
+                take_rows(columns, there)
                 if not len(lines):
                     absent += 1
                     continue
@@ -289,7 +264,7 @@ class SampleTable:
                 column = columns.pop(key, None)
                 missing = len(lines) if column is None else int(np.count_nonzero(np.isnan(column)))
                 filled = (
-                    column if column is None or not missing else _filled(columns["time"], column)
+                    column if column is None or not missing else fill_gaps(columns["time"], column)
                 )
                 if filled is not None:
                     columns[key] = filled
@@ -403,7 +378,7 @@ class SampleTable:
                 harmless=True,
             )
             lines = lines[order]
-            _take(columns, order)
+            take_rows(columns, order)
         apart = self._optional | ({"alt"} if self._repeats else frozenset())
         where = [values for key, values in columns.items() if key not in apart]
         again = np.all([values[1:] == values[:-1] for values in where], axis=0) & self._gaps
@@ -413,14 +388,15 @@ class SampleTable:
             self.notes.note_aircraft(name, "again", said, harmless=self._repeats)
             once = np.concatenate([[True], ~again])
             lines = lines[once]
-            _take(columns, once)
+            take_rows(columns, once)
         times, header = columns["time"], self._columns["time"].header
         at_once = np.diff(times) < _SHORTEST_STEP_S
         count = int(np.count_nonzero(at_once))
-        if self._gaps and count and (count <= len(times) // _ONE_IN or _stays(columns, at_once)):
+        is_slip = count <= len(times) // ONE_IN or are_of_one_second(columns, at_once)
+        if self._gaps and count and is_slip:
             said = f"several samples at one instant, {count} times: the last one counts"
             self.notes.note_aircraft(name, "at once", said)
-            _take(columns, np.append(~at_once, True))
+            take_rows(columns, np.append(~at_once, True))
             return columns
         for i in np.flatnonzero(at_once):
             of = f"{self._problems.of} {lines[i]}"
@@ -454,33 +430,6 @@ class SampleTable:
                 line=int(first.min()),
                 column=self._columns["time"].header,
             )
-
-
-def _stays(columns: dict[str, FloatArray], at_once: Any) -> bool:
-    """Tell whether samples at one instant are near each other: the clock is coarse."""
-    return columns.keys() >= _OF_A_SECOND.keys() and all(
-        bool((np.abs(np.diff(columns[key])[at_once]) <= most).all())
-        for key, most in _OF_A_SECOND.items()
-    )
-
-
-def _filled(times: FloatArray, values: FloatArray) -> FloatArray | None:
-    """Return values with those of the nearest sample in a few gaps; None where they are more."""
-    order = np.argsort(times, kind="stable")
-    known = order[~np.isnan(values[order])]
-    gaps = np.flatnonzero(np.isnan(values))
-    if len(gaps) > len(values) // _ONE_IN:
-        return None
-    after = np.searchsorted(times[known], times[gaps])
-    before, after = known[np.maximum(after - 1, 0)], known[np.minimum(after, len(known) - 1)]
-    is_before = times[gaps] - times[before] <= times[after] - times[gaps]
-    is_before = (is_before & (times[before] <= times[gaps])) | (times[after] < times[gaps])
-    nearest = np.where(is_before, before, after)
-    if np.any(np.abs(times[nearest] - times[gaps]) > _NEAR_S):
-        return None
-    filled = values.copy()
-    filled[gaps] = values[nearest]
-    return filled
 
 
 def _limits(quantity: str) -> tuple[float, float, str]:
