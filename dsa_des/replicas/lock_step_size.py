@@ -11,7 +11,7 @@ from dsa_des.scene.scene import Scene
 MOST_BYTES = 360e6
 # What a run holds of each aircraft: tracks and tables whatever it is, samples, what a scan makes.
 # 25 to 84 kB were measured of two in four loops of 120 and 180 s and 360 to 3240 scans; of nine
-# 340 kB in 120 s and 600 scans, where this gives 328.
+# 106 to 341 kB in 120 s and 600 scans, and of eight platforms 280 kB in 250 s and 2250 scans.
 _BYTES, _BYTES_PER_S, _BYTES_PER_SCAN = 12.5e3, 137.5, 12.5
 #: What is recorded is there so often at most: as it came, in order, and as a metric has it.
 _COPIES = 3
