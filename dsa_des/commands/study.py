@@ -68,11 +68,11 @@ def study_command(
     described = read_study(path, sets=sets)
     described.repeat = command_of(["study"], sets, described.path)
 
-    def again(folder: Path) -> str:
+    def resume_command(folder: Path) -> str:
         return _resume_command(name, folder, sets, workers, executor, scheduler, measure)
 
     target = target_of(_HOME, described.path.stem, out, resume)
-    folder = run_into(described, target, workers, resume, again, executor, scheduler)
+    folder = run_into(described, target, workers, resume, resume_command, executor, scheduler)
     try:
         tables = finish(
             described, folder, quiet=quiet or as_json, draw=not no_figures, as_json=as_json
@@ -80,8 +80,8 @@ def study_command(
         if measure:
             _measure(folder, silent=quiet)
     except KeyboardInterrupt:
-        stop_with("interrupted", again(folder.path), 130)
-    report_crashes([tables], again(folder.path))
+        stop_with("interrupted", resume_command(folder.path), 130)
+    report_crashes([tables], resume_command(folder.path))
 
 
 def options_as_sets(swaps: Sequence[str], seed: int | None, replicas: int | None) -> list[str]:
