@@ -30,7 +30,9 @@ def measured(monkeypatch):
         }  # fmt: skip
 
     monkeypatch.setattr(made, "measure_in_new_process", fresh)
-    monkeypatch.setattr(made.performance_queues, "measure_in_new_process", lambda *of: fresh("queues", *of))
+    monkeypatch.setattr(
+        made.performance_queues, "measure_in_new_process", lambda *of: fresh("queues", *of)
+    )
     return made.measured(3, quick=False), asked
 
 
