@@ -309,7 +309,7 @@ def _wrong(path: Path, at: int, problem: str) -> TrafficFileError:
 
 
 def _blocks(path: Path, data: bytes) -> Iterator[tuple[int, int, Any]]:
-    """Give the byte at which each data block begins, its category, and its records as bits."""
+    """Yield the byte at which each data block begins, its category, and its records as bits."""
     base = library("asterix.base", "asterix", "ASTERIX")
     at = 0
     if not data:

@@ -131,7 +131,7 @@ class FlownFlights:
 
     @property
     def width(self) -> int:
-        """How many targets each run has."""
+        """Return the number of targets of a run."""
         return len(self.targets) // len(self.own)
 
     @property
@@ -141,7 +141,7 @@ class FlownFlights:
 
     @property
     def manoeuvre_count(self) -> int:
-        """How many manoeuvres came so far, in all runs."""
+        """Return the number of manoeuvres so far, in all runs."""
         return sum(int(fleet.manoeuvre_count.sum()) for fleet in self.platforms.values())
 
     @property
