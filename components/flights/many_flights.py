@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from functools import cached_property
 from math import atan2, cos, inf, isnan, radians
 from typing import Any
@@ -146,6 +147,15 @@ class SteeredFleet(Growing, Fleet):
         some._parts, some._flown = self._parts, self._flown
         for name in ("manoeuvre_count", "_start_s", "_part"):
             setattr(some, name, getattr(self, name)[columns])
+        return some
+
+    def part(self, flights: slice, nominal: Fleet) -> SteeredFleet:
+        """Return the fleet of some flights in their order, which `nominal` are without any."""
+        some = copy(self)
+        some.__dict__.pop("max_speeds_mps", None)
+        some._flights, some._alone, some._written = nominal, None, [-1]
+        for name in ("manoeuvre_count", "_start_s", "_part"):
+            setattr(some, name, getattr(self, name)[flights])
         return some
 
     def each(
