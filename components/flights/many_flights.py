@@ -290,10 +290,9 @@ class SteeredFleet(Growing, Fleet):
                 return fleet
             return fleet.add_manoeuvres(ownship[others], time_s[others], given[others])
         around = self._states_around(ownship, time_s)
-        before = [
-            self._flown[self._part[own, count - 1]] if count else None
-            for own, count in zip(ownship, self.manoeuvre_count[ownship], strict=True)
-        ]
+        count = self.manoeuvre_count[ownship]
+        last = np.where(count > 0, self._part[ownship, count - 1], -1).tolist()
+        before = [self._flown[part] if part >= 0 else None for part in last]
         every = [Manoeuvre(*row) for row in given.tolist()]
         flown = steered_parts("ownship", around, time_s, every, before)
         fleet = self._with_parts(ownship, time_s, len(self._flown) + np.arange(len(flown)))
