@@ -23,6 +23,7 @@ from components.messages.steering import (
     Manoeuvres,
 )
 from components.messages.tracks import Tracks
+from dsa_des.arrays.run_ticks import take_runs
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.message import Message
@@ -153,7 +154,7 @@ class TurnOut(Component):
     def run(self, wake: Wake) -> dict[str, Message]:
         """Look at every instant with an alert."""
         alerts: AlertLevels | None = wake["alerts"]
-        self._hear(wake)
+        self._take_choices(wake)
         if alerts is None:
             return {}
         manoeuvres: dict[int, Manoeuvre] = {}
@@ -170,7 +171,7 @@ class TurnOut(Component):
                 tick = int(wake.ticks[index])
                 if run in now:
                     later.append((index, run))
-                elif tick >= self._free_from.get(run, 0) or self._must_give_way(run, tick):
+                elif self._is_free(run, tick) or self._must_give_way(run, tick):
                     now[run] = index
                 elif self.p.address is not None:
                     told[index] = self._repeated_side(run, tick)
@@ -179,7 +180,7 @@ class TurnOut(Component):
             for (run, index), changes in zip(now.items(), result, strict=True):
                 tick = int(wake.ticks[index])
                 change = None if changes is None else self._choose(run, tick, changes)
-                if changes is not None:
+                if changes is not None and self._is_free(run, tick):
                     due = np.array([run])
                     self._stuck = with_cases(self._stuck, due[: change is None], due)
                 if change is not None:
@@ -195,9 +196,9 @@ class TurnOut(Component):
         }
         return {port: message for port, message in messages.items() if message is not None}
 
-    def _hear(self, wake: Wake) -> None:
+    def _take_choices(self, wake: Wake) -> None:
         """Take in the latest choice of each other aircraft."""
-        since = int(wake.ticks[0]) - int(self.p.heeds_s * self.context.ticks_per_s)
+        since = int(wake.ticks.min()) - int(self.p.heeds_s * self.context.ticks_per_s)
         for new in wake.arrivals("told") if self.p.address is not None else ():
             sides = new.message
             columns = sides.run, new.tick, sides.address, sides.side
@@ -226,6 +227,10 @@ class TurnOut(Component):
         self._chosen[run] = tick, side
         return side
 
+    def _is_free(self, run: int, tick: int) -> bool:
+        """Whether its last manoeuvre was long enough ago."""
+        return tick >= self._free_from.get(run, 0)
+
     def _must_give_way(self, run: int, tick: int) -> bool:
         """Whether a lower address has chosen what does not go with its own choice."""
         mine = self._repeated_side(run, tick) if self.p.address is not None else 0
@@ -236,17 +241,17 @@ class TurnOut(Component):
         """Return the change to fly: the smaller one, or the one compatible with the others'
         choices.
 
-        Without a way there it is free.
+        Without a way there it is free, but not before its time.
         """
         others = self._other_choices(run, tick) if self.p.address is not None else []
-        mine = self._repeated_side(run, tick)
-        if mine and self.p.address is not None:  # only a lower address changes what was chosen
-            others = [(a, side) for a, side in others if a < self.p.address]
         if others:
-            there = changes[1] if self._matching_side(others[0][1]) > 0 else changes[0]
+            (address, side), mine = others[0], self._repeated_side(run, tick)
+            # Only a lower address changes what was chosen in this conflict.
+            keeps = mine and address > (self.p.address or 0)
+            there = changes[1] if (mine if keeps else self._matching_side(side)) > 0 else changes[0]
             if math.isfinite(there):
                 return there
-        return smaller(changes)
+        return smaller(changes) if self._is_free(run, tick) else None
 
     def _manoeuvre(self, change: float) -> Manoeuvre:
         """Return what makes a change."""
@@ -343,7 +348,7 @@ class TurnAway(Component):
         self._rangeless = NO_COUNTS
 
     def warnings(self) -> list[str]:
-        """Say that nobody measures the range by which it goes."""
+        """Warn that no sensor measures the range that it needs."""
         blind = "" if self.p.without_range else without_range(self.context.producers)
         if not blind:
             return []
@@ -364,10 +369,11 @@ class TurnAway(Component):
             return None
         near = tracks.range_m <= 1000.0 * self.p.range_km
         row = tracks.row_of_entries
-        run = tracks.run[row]
-        self._rangeless = with_cases(self._rangeless, run[np.isnan(tracks.range_m)], run)
+        rangeless = np.isnan(tracks.range_m)
+        of = take_runs(tracks.run, row)
+        self._rangeless = with_cases(self._rangeless, take_runs(of, rangeless.nonzero()[0]), of)
         if self.p.without_range:
-            near |= np.isnan(tracks.range_m)
+            near |= rangeless
         manoeuvres: dict[int, Manoeuvre] = {}
         rows = np.flatnonzero(np.bincount(row[near]))
         instants = wake.ticks[rows].tolist(), wake.run[rows].tolist()
@@ -382,7 +388,7 @@ class TurnAway(Component):
         return Manoeuvres.at_rows(wake.instants, manoeuvres)
 
     def _turn(self, *, on_the_left: bool) -> Manoeuvre:
-        """Return the turn for somebody on a side."""
+        """Return the turn away from an aircraft on one side."""
         to_the_right = {"away": on_the_left, "towards": not on_the_left}
         right = to_the_right.get(self.p.direction, self.p.direction == "right")
         bank_deg = self.p.bank_deg or 0.0

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from components.aircraft.equipage import AdsBEquipage, Equipage, IcaoAddress
 from components.aircraft.table_files import RcsTableFile, SilhouetteTableFile
-from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
+from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters
 from dsa_des.time.randomness import target_keys
 
@@ -85,6 +85,8 @@ _IR = InfraredAreas(front_m2=4.6, back_m2=4.6, side_m2=11.15, horizontal_m2=35.5
 class Aircraft(Parameters):
     """What sensors need to know of one aircraft; files in ``configs/aircraft`` hold these keys."""
 
+    may_change: ClassVar[tuple[str, ...]] = ("mode_s", "mode_c", "ads_b")
+
     rcs_dbsm: float = Field(default=3.01, description="Mean radar cross-section, dBsm (Table 4.1).")
     rcs_table: RcsTableFile | None = Field(
         default=None,
@@ -116,13 +118,19 @@ class Aircraft(Parameters):
         description="Whether a Mode C one, which gives no identity; Mode S counts first.",
     )
     ads_b: AdsBEquipage | None = Field(
-        default=None, description="What it broadcasts; nothing if left out."
+        default=None,
+        description="What it broadcasts; nothing if left out, or false.",
     )
     icao_address: IcaoAddress | None = Field(
         default=None,
         description="24-bit address of Mode S and ADS-B, six hexadecimal digits; by default one "
         "that follows from its name.",
     )
+
+    @field_validator("ads_b", mode="before")
+    @classmethod
+    def _broadcasts_or_not(cls, given: Any) -> Any:
+        return None if given is False else given
 
 
 #: The name of whose place a scene is seen from where nothing else is said.
@@ -152,6 +160,8 @@ class Roster:
     aircraft: tuple[Aircraft, ...]
     own_name: str = OWNSHIP
     own_aircraft: tuple[Aircraft, ...] = (Aircraft(),)
+    #: The same from instants of the run on (ns, rising), where the equipage changes.
+    later: tuple[tuple[int, "Roster"], ...] = ()
 
     @classmethod
     def from_pairs(
@@ -182,8 +192,9 @@ class Roster:
             looking = aircraft[target::width]
             aircraft[target::width] = own if len(own) > 1 else own * len(looking)
             names[target] = self.own_name
+            later = tuple((from_ns, then.seen_from(target)) for from_ns, then in self.later)
             known[target] = Roster(
-                tuple(names), tuple(aircraft), self.names[target], tuple(looking)
+                tuple(names), tuple(aircraft), self.names[target], tuple(looking), later
             )
         return known[target]
 
@@ -195,6 +206,7 @@ class Roster:
             isinstance(other, Roster)
             and self.names == other.names
             and self.own_name == other.own_name
+            and self.later == other.later
             and all(map(_is_alike, self.aircraft, other.aircraft))
             and all(map(_is_alike, self.own_aircraft, other.own_aircraft))
         )
@@ -245,9 +257,21 @@ class Roster:
 
     @cached_property
     def equipage(self) -> Equipage:
-        """What all aircraft carry for others to know them by."""
-        keys = np.tile(self.keys, len(self.aircraft) // max(1, len(self.names)))
-        return Equipage.from_aircraft(self.aircraft, keys)
+        """What all aircraft carry for others to know them by, then what they do later."""
+        every = [*self.aircraft, *(one for _, then in self.later for one in then.aircraft)]
+        return Equipage.from_aircraft(every, np.tile(self.keys, len(every) // max(1, len(self))))
+
+    def equipped(self, craft: IntArray, instant_ns: IntArray) -> IntArray:
+        """Return the rows of `equipage` for some of the aircraft at instants of the run."""
+        if not self.later:
+            return craft
+        begins_ns = [from_ns for from_ns, _ in self.later]
+        return craft + len(self.aircraft) * np.searchsorted(begins_ns, instant_ns, side="right")
+
+    @cached_property
+    def ever_broadcasts(self) -> BoolArray:
+        """Which aircraft send ADS-B at some time, shape (targets,)."""
+        return np.asarray(self.equipage.ads_b.reshape(1 + len(self.later), -1).any(axis=0))
 
     @cached_property
     def engines(self) -> AnyArray:

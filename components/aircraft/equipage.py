@@ -31,6 +31,9 @@ POSITION_RADIUS_M = np.array(
 VELOCITY_RADIUS_M_S = np.array([np.nan, 10.0, 3.0, 1.0, 0.3])
 #: Standard deviations of each of two axes in the 95 % radius of both, 2.448.
 RADIUS_IN_DEVIATIONS = math.sqrt(-2.0 * math.log(0.05))
+#: 95 % of errors of geometric height by their accuracy, GVA 1 and 2, m (the same, table 2-71).
+HEIGHT_ERROR_M = np.array([np.nan, 150.0, 45.0])
+_95_IN_DEVIATIONS = 1.959964
 
 
 def _address(given: str) -> str:
@@ -65,6 +68,13 @@ class AdsBEquipage(Parameters):
         ge=1,
         le=11,
         description="Navigation integrity category that it sends; by default the number of nacp.",
+    )
+    gva: int | None = Field(
+        default=None,
+        ge=1,
+        le=2,
+        description="Geometric vertical accuracy: 95 % of the heights above the ellipsoid that it "
+        "sends beside pressure altitudes within 150, 45 m for 1, 2; it sends none if left out.",
     )
     latency_s: float = Field(
         default=0.0,
@@ -138,6 +148,7 @@ class Equipage:
     silent_after_s: FloatArray
     #: North, east and up, (3, aircraft).
     spoofed_m: FloatArray
+    gva: IntArray
     address: IntArray
 
     @property
@@ -149,6 +160,11 @@ class Equipage:
     def velocity_deviation_m_s(self) -> FloatArray:
         """Standard deviation of each horizontal axis of velocity, m/s."""
         return np.asarray(VELOCITY_RADIUS_M_S[self.nacv] / RADIUS_IN_DEVIATIONS)
+
+    @property
+    def height_deviation_m(self) -> FloatArray:
+        """Standard deviation of geometric heights, m; NaN of who sends none."""
+        return np.asarray(HEIGHT_ERROR_M[self.gva] / _95_IN_DEVIATIONS)
 
     @property
     def late_s(self) -> FloatArray:
@@ -187,6 +203,7 @@ class Equipage:
             sent("compensated_s", 0.0, float),
             sent("silent_after_s", np.inf, float),
             np.stack([sent(f"spoofed_{axis}_m", 0.0, float) for axis in ("north", "east", "up")]),
+            sent("gva", 0, int),
             np.where(own == 0, drawn, own),
         )
 

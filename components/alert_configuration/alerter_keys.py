@@ -191,7 +191,7 @@ class AlerterKeys:
         for key in [key for key in self._lines if key.startswith(start)]:
             number, shown, text = self._lines[key]
             try:
-                if table.takes(key[len(start) :], shown, text):
+                if table.read_key(key[len(start) :], shown, text):
                     self._used.add(key)
             except BadValue as error:
                 self._used.add(key)

@@ -58,7 +58,7 @@ def read_conf(path: str | PathLike[str]) -> Configuration:
 
 
 def _refuse_release_1(lines: Lines, path: Path) -> None:
-    """Call a file of DAIDALUS 1 what it is: nothing else is said of its keys."""
+    """Refuse a file of DAIDALUS 1 by one error, without a word on its keys."""
     old = [name for key, (_, name, _) in lines.items() if _OF_RELEASE_1.fullmatch(key)]
     if old and "alerters" not in lines:
         problems = Problems(str(path))

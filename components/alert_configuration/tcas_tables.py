@@ -36,7 +36,7 @@ class TableKeys:
         self._tops: dict[int, tuple[str, float]] = {}
         self._sizes: list[tuple[str, str, int, float]] = []
 
-    def takes(self, key: str, shown: str, text: str) -> bool:
+    def read_key(self, key: str, shown: str, text: str) -> bool:
         """Take a key and its value, if it is one of a table; `BadValue` if the value is none."""
         match = _KEY.fullmatch(key)
         if match is None:

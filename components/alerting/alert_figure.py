@@ -11,7 +11,7 @@ from components.alerting.encounter import Encounter
 from components.alerting.levels import Alerts
 from components.arguments.units import NAUTICAL_MILE_M
 from components.well_clear.volume import Volume
-from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts
 
 #: Colour of each level from 0; levels beyond the last share its colour.
 _COLOURS = ("#7f7f7f", "#e6b800", "#e07b00", "#c1121f")
@@ -38,7 +38,7 @@ def draw_alerts(
         _bands(figure.add_subplot(grid[2, 0], sharex=over_time), encounter, bands)
         _draw_plan(figure.add_subplot(grid[:, 1]), configuration, encounter, alerts)
         figure.suptitle(figure_text(title))
-        tight(figure)
+        fit_axes_to_texts(figure)
 
 
 def _seconds_since_start(encounter: Encounter) -> Any:

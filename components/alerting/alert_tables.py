@@ -11,7 +11,7 @@ from components.alerting.levels import Alerts
 from components.formats.text_rows import LENGTH_M, SPEED_MPS
 from components.guidance.bands import guidance_of_many
 from components.guidance.intervals import Band
-from components.guidance.kinds import KINDS
+from components.guidance.manoeuvre_kinds import KINDS
 from components.guidance.memory import GuidanceMemory
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State

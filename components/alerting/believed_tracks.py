@@ -34,7 +34,7 @@ _OWN_VELOCITY = ("east_mps", "north_mps", "climb_mps")
 
 
 class EstimatedFlights:
-    """What has come of trackers' states: confirmed and coasted tracks that have a range.
+    """The tracks received so far: confirmed and coasted ones that have a range.
 
     One that has had no detection for `STALE_S` is refused, whatever is still held of it, and so is
     one of the platform itself that another platform's sensor made.
@@ -125,7 +125,7 @@ class EstimatedFlights:
         if len(given) == 0 or self._others is None or own_velocity is None:
             return instant, tracks.number, state, deviations, age_s
         of = instant[given]
-        is_own, theirs = self._others.judged(
+        is_own, theirs = self._others.judge_tracks(
             tracks.take(given), ahead_s[given], own_place[:, of], own_velocity[:, of], of
         )
         for mine, values in zip(deviations, theirs, strict=True):
@@ -251,7 +251,9 @@ class BelievedTracks:
 
 
 def _asked_later(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
-    """Return which rows are asked for after some scans: the last before them, and later ones."""
+    """Return which rows later scans may still need: the last one before each of them, and later
+    ones.
+    """
     ends = asked.take(asked.last_of_each)
     last = last_of_run(came, ends)
     there = np.minimum(np.searchsorted(ends.run, came.run), len(ends) - 1)

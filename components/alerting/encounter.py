@@ -86,7 +86,7 @@ def read_encounter(
             aircraft[key] = aircraft[key] - np.interp(aircraft["time"], own["time"], part)
     others = [samples[name] for name in names[1:]]
     index, present = _simultaneous_samples(own["time"], others)
-    targets = {key: _gather([o[key] for o in others], index) for key in own}
+    targets = {key: _columns_at([o[key] for o in others], index) for key in own}
     flat = "sx" in own
     state = _flat_states if flat else _projected_states
     relative, own_state, own_plane, target_plane = state(own, targets)
@@ -169,11 +169,11 @@ def _simultaneous_samples(own_s: FloatArray, others: list[Samples]) -> tuple[Int
     """Return each target's sample at each of the ownship's times, and whether there is one."""
     index = np.stack([np.searchsorted(o["time"], own_s) for o in others], axis=1)
     index = np.minimum(index, np.array([len(other["time"]) - 1 for other in others]))
-    times = _gather([other["time"] for other in others], index)
+    times = _columns_at([other["time"] for other in others], index)
     return index, times == own_s[:, np.newaxis]
 
 
-def _gather(columns: list[FloatArray], place: IntArray) -> FloatArray:
+def _columns_at(columns: list[FloatArray], place: IntArray) -> FloatArray:
     return np.stack(
         [column[np.maximum(place[:, i], 0)] for i, column in enumerate(columns)], axis=1
     )
@@ -253,20 +253,20 @@ def _bounds(
 ) -> Bounds:
     """Return how far relative states may be wrong: standard deviations times z-scores."""
 
-    def both(find: Callable[..., Any], *keys: str) -> FloatArray:
+    def deviations_of_both(find: Callable[..., Any], *keys: str) -> FloatArray:
         mine = [own[key][:, np.newaxis] for key in keys]
         theirs = [targets[key] for key in keys]
         return np.asarray(find(*mine) + find(*theirs))
 
     deviations = Deviations(
-        both(_longest, "s_ew_std", "s_ns_std", "s_en_std"),
-        both(np.abs, "sz_std"),
-        both(_longest, "v_ew_std", "v_ns_std", "v_en_std"),
-        both(np.abs, "vz_std"),
+        deviations_of_both(_longest_deviation, "s_ew_std", "s_ns_std", "s_en_std"),
+        deviations_of_both(np.abs, "sz_std"),
+        deviations_of_both(_longest_deviation, "v_ew_std", "v_ns_std", "v_en_std"),
+        deviations_of_both(np.abs, "vz_std"),
     )
     return margins(configuration, deviations, np.hypot(relative[0], relative[1]))
 
 
-def _longest(east: FloatArray, north: FloatArray, signed_root: FloatArray) -> FloatArray:
+def _longest_deviation(east: FloatArray, north: FloatArray, signed_root: FloatArray) -> FloatArray:
     """Return the deviation along the longest axis; files give signed roots of covariances."""
     return largest(east, north, np.sign(signed_root) * signed_root**2)

@@ -6,7 +6,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration, Level
 from components.alerting.memory import AlertMemory, MemoryRule
-from components.guidance.kinds import kind_of
+from components.guidance.manoeuvre_kinds import kind_of
 from components.guidance.situation import Detector, State
 from components.well_clear.detection import Bounds, detection_span, select_bounds
 from components.well_clear.relative_motion import is_surely_less

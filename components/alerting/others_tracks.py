@@ -43,7 +43,7 @@ class OthersTracks:
         on_board = sum(1 << i for i, n in enumerate(tracks.sensors) if n not in self.sensors)
         return np.asarray(tracks.contributors & on_board == 0)
 
-    def judged(
+    def judge_tracks(
         self,
         tracks: KeyedTable,
         ahead_s: FloatArray,

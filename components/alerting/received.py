@@ -1,4 +1,4 @@
-"""What has come to an alerting block, and the ownship's own flight as it knows it."""
+"""Messages that an alerting block has received, and the ownship's flight as it believes it."""
 
 from typing import Any, Self
 
@@ -13,7 +13,7 @@ from dsa_des.block.wake import Wake
 
 
 class ReceivedRows(KeyedTable):
-    """Rows that have come: those of each run (``replica``) together, by when they ``came``."""
+    """Received rows, by run (``replica``) and then by the tick at which they ``came``."""
 
     @classmethod
     def without_rows(cls, *whole: str, **shapes: tuple[int, ...]) -> Self:
@@ -39,7 +39,7 @@ class ReceivedRows(KeyedTable):
 
 
 class OwnPoses:
-    """What has come of the ownship's poses."""
+    """The ownship's poses received so far."""
 
     def __init__(self, ticks_per_s: int) -> None:
         self._per_s = ticks_per_s
@@ -67,11 +67,11 @@ class OwnPoses:
         self._poses = poses.take(poses.tick >= newest.tick)
 
     def has_come(self, asked: RunTicks) -> BoolArray:
-        """Return whether any has come by some instants."""
+        """Return whether any row was received by each of some instants."""
         return np.asarray(self._poses.last(asked) >= 0)
 
     def pose_of(self, measured: RunTicks, came: RunTicks, asked: BoolArray) -> IntArray:
-        """Return the pose of when something was measured, of those that had come; -1 for none."""
+        """Return which received pose is of the instant of each measurement; -1 for none."""
         index = np.minimum(last_of_run(self._made_ticks, measured), self._poses.last(came))
         first = first_of_run(self._poses.instants, came.run)
         if self._old and bool((asked & (index <= first)).any()):
@@ -108,7 +108,9 @@ class OwnPoses:
         }
 
     def set_aside(self, tick: int, wake: Wake, *, late_sights: bool) -> None:
-        """Set poses aside that only what comes late asks for, and drop those of ended runs."""
+        """Keep poses that only late measurements need apart from the rest, and drop those of ended
+        runs.
+        """
         if len(self._poses) and self._poses.replica[0] < wake.first_run:
             self._poses = self._poses.take(self._poses.replica >= wake.first_run)
             self._old = []

@@ -178,7 +178,7 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     )
 
 
-def check_model(value: object) -> str:
+def check_swerling_model(value: object) -> str:
     """Return the canonical name of a Swerling model; swerling5 is another name of swerling0."""
     name = one_of("model", value, (*MODELS, *_ALIASES))
     return _ALIASES.get(name, name)

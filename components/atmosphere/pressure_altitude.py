@@ -1,98 +1,133 @@
 """Pressure altitude and height: what altimeters read at a height in air that is not the standard's.
 
-The air is hydrostatic, of the standard's lapse rate and dry, colder or warmer everywhere by one
-offset, and has one pressure at sea level. Heights are above sea level and are taken as geopotential
-ones, from which they differ by 1.4 m at 3 km; so in the standard atmosphere both are the same
-number, to the bit. ICAO, "Manual of the ICAO standard atmosphere", Doc 7488.
+The air is hydrostatic and dry, and the same over all of a scene. Heights count as geopotential
+ones, from which they differ by 1.4 m at 3 km. A scene of the standard's, where sea level lies on
+the ellipsoid, has no `Air`: altitude and height are the same number. ICAO, "Manual of the ICAO
+standard atmosphere", Doc 7488.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import (
-    broadcast_flat,
-    check_within,
-    finite,
-    positive,
-    refuse,
-    unflatten,
-)
+from components.arguments.checks import check_within
+from dsa_des.arrays.types import FloatArray, IntArray
 
 #: Pressure at sea level, hPa.
 STANDARD_HPA = 1013.25
 _SEA_LEVEL_K, _LAPSE_K_M, _TROPOPAUSE_M = 288.15, 0.0065, 11_000.0
-_TROPOPAUSE_K = _SEA_LEVEL_K - _LAPSE_K_M * _TROPOPAUSE_M
+_ZERO_C_K = 273.15
 #: g / R of dry air, K/m.
 _HYDROSTATIC_K_M = 9.80665 / 287.05287
 #: Heights at which the formulas are used; the layer above the tropopause is continued.
 LOWEST_M, HIGHEST_M = -5_000.0, 30_000.0
 
 
-def pressure_altitude_m(
-    height_m: ArrayLike, *, qnh_hpa: ArrayLike = STANDARD_HPA, offset_k: ArrayLike = 0.0
-) -> Any:
-    """Return the altitude that an altimeter set to 1013.25 hPa reads, m.
+@dataclass(frozen=True)
+class Air:
+    """The air of a scene: what altimeters set to 1013.25 hPa read at heights above the ellipsoid.
 
     Parameters
     ----------
-    height_m : array_like, m
-        Above sea level, -5 to 30 km.
-    qnh_hpa : array_like, hPa
+    qnh_hpa : float
         Pressure at sea level.
-    offset_k : array_like, K
+    offset_k : float
         How much warmer the air is than the standard's at every height, above -100.
+    profile_c : tuple of (height, temperature)
+        In its place, what the temperature is (deg C) at rising heights above sea level (m): even
+        in between, and below and above as much off the standard's as at the nearest of them.
+    geoid_m : float
+        How high sea level lies above the ellipsoid.
     """
-    shape, (height, qnh, offset) = _checked("height_m", height_m, qnh_hpa, offset_k)
-    standard = (qnh == STANDARD_HPA) & (offset == 0.0)
-    drop = _log_drop(height, offset) - np.log(qnh / STANDARD_HPA)
-    return unflatten(np.where(standard, height, _height_of(drop, 0.0)), shape)
+
+    qnh_hpa: float = STANDARD_HPA
+    offset_k: float = 0.0
+    profile_c: tuple[tuple[float, float], ...] = ()
+    geoid_m: float = 0.0
+
+    def pressure_altitude_m(self, height_m: ArrayLike) -> Any:
+        """Return what altimeters read at heights from -5 to 30 km, m."""
+        height = check_within("height_m", height_m, LOWEST_M, HIGHEST_M, "m") - self.geoid_m
+        return _STANDARD.height_m(self._column.drop(height) - self._excess)
+
+    def height_m(self, altitude_m: ArrayLike) -> Any:
+        """Return the heights at which altimeters read some altitudes, m; its inverse."""
+        altitude = check_within("altitude_m", altitude_m, LOWEST_M, HIGHEST_M, "m")
+        return self._column.height_m(_STANDARD.drop(altitude) + self._excess) + self.geoid_m
+
+    @property
+    def _excess(self) -> float:
+        return float(np.log(self.qnh_hpa / STANDARD_HPA))
+
+    @cached_property
+    def _column(self) -> _AirColumn:
+        off_k = self.offset_k
+        known = {h: c + _ZERO_C_K for h, c in self.profile_c} or {0.0: _SEA_LEVEL_K + off_k}
+        heights, kelvin = np.array(sorted(known.items())).T
+        off = kelvin - _standard_k(heights)
+        every = np.union1d(heights, [0.0, _TROPOPAUSE_M])
+        outside = _standard_k(every) + np.interp(every, heights, off)
+        inside = (every >= heights[0]) & (every <= heights[-1])
+        return _AirColumn(every, np.where(inside, np.interp(every, heights, kelvin), outside))
 
 
-def height_of_pressure_altitude_m(
-    altitude_m: ArrayLike, *, qnh_hpa: ArrayLike = STANDARD_HPA, offset_k: ArrayLike = 0.0
-) -> Any:
-    """Return the height above sea level at which an altimeter reads an altitude, m.
+def scene_air(sections: Mapping[str, Any]) -> Air | None:
+    """Return a scene's air, of its ``[weather]`` and ``[terrain]``; None for the standard's."""
+    weather, terrain = sections.get("weather"), sections.get("terrain")
+    air = Air(geoid_m=0.0 if terrain is None else terrain.geoid_undulation_m)
+    if weather is not None:
+        column = weather.temperature_offset_c, weather.temperature_profile_c
+        air = Air(weather.qnh_hpa, *column, air.geoid_m)
+    return None if air == Air() else air
 
-    The inverse of `pressure_altitude_m`, with its parameters.
+
+class _AirColumn:
+    """Air whose temperature is known at rising heights, 0 and 11 km among them, even in between.
+
+    It falls by the standard's lapse rate below the lowest, and is the same above the highest.
     """
-    shape, (altitude, qnh, offset) = _checked("altitude_m", altitude_m, qnh_hpa, offset_k)
-    standard = (qnh == STANDARD_HPA) & (offset == 0.0)
-    drop = _log_drop(altitude, 0.0) + np.log(qnh / STANDARD_HPA)
-    return unflatten(np.where(standard, altitude, _height_of(drop, offset)), shape)
+
+    def __init__(self, heights_m: FloatArray, kelvin: FloatArray) -> None:
+        self._from_m, below = heights_m, np.concatenate([[0], np.arange(len(heights_m))])
+        self._base_m, self._base_k = heights_m[below], kelvin[below]
+        lapse = -np.diff(kelvin) / np.diff(heights_m)
+        self._lapse_k_m = np.concatenate([[_LAPSE_K_M], lapse, [0.0]])
+        layer = np.arange(1, len(heights_m))
+        drops = np.concatenate([[0.0], np.cumsum(self._rise(layer, np.diff(heights_m)))])
+        self._from_drop = drops - drops[np.searchsorted(heights_m, 0.0)]
+        self._base_drop = self._from_drop[below]
+
+    def drop(self, height_m: FloatArray) -> FloatArray:
+        """Return by how much the logarithm of pressure falls from sea level to heights."""
+        layer = np.searchsorted(self._from_m, height_m, side="right")
+        above_m = height_m - self._base_m[layer]
+        return np.asarray(self._base_drop[layer] + self._rise(layer, above_m))
+
+    def _rise(self, layer: IntArray, height_m: FloatArray) -> FloatArray:
+        """Return by how much it falls from the bases of layers to heights above these."""
+        lapse, kelvin = self._lapse_k_m[layer], self._base_k[layer]
+        even = np.where(lapse == 0.0, 1.0, lapse)
+        falling = -_HYDROSTATIC_K_M / even * np.log1p(-lapse * height_m / kelvin)
+        return np.where(lapse == 0.0, _HYDROSTATIC_K_M * height_m / kelvin, falling)
+
+    def height_m(self, drop: FloatArray) -> FloatArray:
+        """Return the heights at which the logarithm of pressure fell by so much."""
+        layer = np.searchsorted(self._from_drop, drop, side="right")
+        lapse, kelvin = self._lapse_k_m[layer], self._base_k[layer]
+        share = (drop - self._base_drop[layer]) / _HYDROSTATIC_K_M
+        even = np.where(lapse == 0.0, 1.0, lapse)
+        falling = -kelvin / even * np.expm1(-share * lapse)
+        return np.asarray(self._base_m[layer] + np.where(lapse == 0.0, share * kelvin, falling))
 
 
-def scene_air(weather: Any) -> dict[str, float]:
-    """Return a scene's air as the parameters of these functions; empty for the standard's."""
-    if weather is None:
-        return {}
-    air = {"qnh_hpa": weather.qnh_hpa, "offset_k": weather.temperature_offset_c}
-    return {} if air == {"qnh_hpa": STANDARD_HPA, "offset_k": 0.0} else air
+def _standard_k(height_m: FloatArray) -> FloatArray:
+    return _SEA_LEVEL_K - _LAPSE_K_M * np.minimum(height_m, _TROPOPAUSE_M)
 
 
-def _checked(name: str, height_m: ArrayLike, qnh_hpa: ArrayLike, offset_k: ArrayLike) -> Any:
-    offset = finite("offset_k", offset_k)
-    refuse("offset_k", offset, offset <= -100.0, "be above -100")
-    height = check_within(name, height_m, LOWEST_M, HIGHEST_M, "m")
-    return broadcast_flat(height_m=height, qnh_hpa=positive("qnh_hpa", qnh_hpa), offset_k=offset)
-
-
-def _log_drop(height: Any, offset: Any) -> Any:
-    """Return by how much the logarithm of pressure falls from sea level to heights."""
-    below = np.minimum(height, _TROPOPAUSE_M)
-    warmth = _SEA_LEVEL_K + offset
-    exponent = _HYDROSTATIC_K_M / _LAPSE_K_M
-    drop = -exponent * np.log1p(-_LAPSE_K_M * below / warmth)
-    return drop + _HYDROSTATIC_K_M * (height - below) / (_TROPOPAUSE_K + offset)
-
-
-def _height_of(drop: Any, offset: Any) -> Any:
-    """Return the heights at which the logarithm of pressure fell by so much."""
-    tropopause = _log_drop(_TROPOPAUSE_M, offset)
-    below = np.minimum(drop, tropopause)
-    warmth = _SEA_LEVEL_K + offset
-    height = -warmth / _LAPSE_K_M * np.expm1(-below * _LAPSE_K_M / _HYDROSTATIC_K_M)
-    return height + (drop - below) * (_TROPOPAUSE_K + offset) / _HYDROSTATIC_K_M
+_STANDARD = _AirColumn(np.array([0.0, _TROPOPAUSE_M]), _standard_k(np.array([0.0, _TROPOPAUSE_M])))

@@ -79,7 +79,7 @@ def rain_volume_m3(
     solid = math.pi * azimuth_beamwidth_rad * elevation_beamwidth_rad / (8.0 * _LN_2)
     spread = distance * np.cos(elevation) * elevation_beamwidth_rad / math.sqrt(16.0 * _LN_2)
     spread = np.maximum(spread, 1e-9)
-    share = _below((highest_m - height) / spread) - _below((lowest_m - height) / spread)
+    share = _share_below((highest_m - height) / spread) - _share_below((lowest_m - height) / spread)
     volume = distance * distance * solid * range_resolution_m * np.maximum(share, 0.0)
     return unflatten(volume, shape)
 
@@ -131,7 +131,7 @@ def rain_spread_m_s(
     return unflatten(np.sqrt(shear**2 + _TURBULENCE_M_S**2 + fall**2), shape)
 
 
-def _below(deviations: FloatArray) -> FloatArray:
+def _share_below(deviations: FloatArray) -> FloatArray:
     """Return the share of a normal distribution that lies so many deviations above it or lower."""
     from scipy.special import ndtr
 

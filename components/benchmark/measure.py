@@ -23,7 +23,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--repeats", type=int, default=5)
     options = parser.parse_args(arguments)
     if options.kind != "calls":  # a host has all of its machine
-        pin()
+        pin_to_one_processor()
     say_json(_measure_alone(options.kind, options.name, options.quick, options.repeats))
     return 0
 
@@ -39,15 +39,15 @@ def _measure_alone(kind: str, name: str, quick: bool, repeats: int) -> dict[str,
 
         return rates.measure_rate(name, quick, repeats)
     if kind == "calls":
-        from components.benchmark import calls
+        from components.benchmark import call_times
 
-        return calls.measure_calls(300 if quick else 1800, repeats)
+        return call_times.measure_calls(300 if quick else 1800, repeats)
     from components.benchmark import pairs
 
     return pairs.measure_pairs(name, quick, repeats)
 
 
-def pin() -> None:
+def pin_to_one_processor() -> None:
     """Keep this process on one processor, where the system can."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})

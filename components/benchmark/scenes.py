@@ -209,7 +209,7 @@ def _yardstick(case: BenchmarkCase, scene: Scene, scenes: list[Scene]) -> Callab
 
 
 def _fly_if_steered(scene: Scene) -> Simulation:
-    """Return a simulation to read the scene from; a steered ownship must have been flown."""
+    """Return a scene's simulation for the plain loop, run first where its ownship is steered."""
     simulation = Simulation(scene)
     if len(getattr(simulation.components["traffic"].own, "segments", ())) != 1:  # type: ignore[attr-defined]
         simulation.run()

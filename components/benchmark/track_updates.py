@@ -206,7 +206,7 @@ def track_plainly(
 _FEW = 27
 
 
-def plainly(targets: int) -> tuple[int, Callable[[], object]]:
+def plain_updates(targets: int) -> tuple[int, Callable[[], object]]:
     """Return how many updates the plain loop does in one run, and what does them."""
     block = listening(1, targets)
     scans, poses = _looks(block)
@@ -217,7 +217,7 @@ def plainly(targets: int) -> tuple[int, Callable[[], object]]:
     return updates, lambda: track_plainly(rest, *first, intensity, looks[0].time_s)
 
 
-def by_stone_soup(targets: int) -> tuple[int, Callable[[], object]] | None:
+def stone_soup_updates(targets: int) -> tuple[int, Callable[[], object]] | None:
     """Return how many updates Stone Soup's tracker does in some looks, and what does them.
 
     None where it is not installed.

@@ -73,7 +73,7 @@ class LivePacer(Pacer):
 
     def start(self) -> None:
         """Let simulated time 0 be when nothing holds the run any more."""
-        self._hold()
+        self._wait_while_held()
         super().start()
 
     def __call__(self, time_s: float) -> None:
@@ -88,9 +88,9 @@ class LivePacer(Pacer):
         self.max_lag_s = max(self.max_lag_s, lag_s)
         self.total_lag_s += lag_s
         self._came_to(time_s, lag_s)
-        self._hold()
+        self._wait_while_held()
 
-    def _hold(self) -> None:
+    def _wait_while_held(self) -> None:
         """Wait while the run is held; its clock stands still meanwhile."""
         began = self.now()
         while not self.stopped and self._holds():
@@ -160,7 +160,7 @@ class SessionControl:
         return self._pauses and self._operators == 0
 
     def show_time(self, time_s: float, lag_s: float) -> None:
-        """Take note of how far the run has come, and show it."""
+        """Note the simulated time that the run has reached, and show it."""
         self._now = time_s, lag_s, None if self.scope is None else self.scope.take_received()
         if self._gone_at is not None:
             self.holds()
@@ -170,7 +170,7 @@ class SessionControl:
         wall_s = time.perf_counter()
         if wall_s - self._shown_at >= max(FRAME_S, self._made_s / _SHARE):
             self._shown_at = wall_s
-            self._server.show()
+            self._server.announce_picture()
 
     def sentence(self) -> str:
         """Return what was decided, for the terminal."""
@@ -178,8 +178,9 @@ class SessionControl:
         return f"{taken} decision{'' if taken == 1 else 's'} taken in, up to {self._now[0]:.1f} s"
 
     def _decision_fields(self, message: Judged | Turned | Climbed, taken: Taken) -> dict[str, Any]:
-        """Return what pages are told of a decision that was taken in: of its time, s, the alert's
-        level, where a command leads to, until when, and what it replaces."""
+        """Return the fields that pages receive of an accepted decision: its time, s, the alert's
+        level, the commanded value, until when it is flown, and which command it replaces.
+        """
         assert self.scope is not None
         answer: dict[str, Any] = {
             "time": round(taken.time_s, 6), "level": self.scope.level_of(message.target)
@@ -208,7 +209,7 @@ class SessionControl:
         self._operators = count
         self._pacer.wake()
         # A run that pauses now comes to no other instant, and the other pages are to know of it.
-        self._server.show()
+        self._server.announce_picture()
 
     def welcome(self, role: str) -> dict[str, Any]:
         """Return the first message to a new page: names, units and limits of the scene."""
@@ -251,7 +252,7 @@ class SessionControl:
         """Take in a message of a page."""
         if isinstance(message, Chosen):
             page.chosen = message.target
-            self._server.show()
+            self._server.announce_picture()
             return
         if page.role != OPERATOR:
             number = getattr(message, "id", None)
@@ -285,7 +286,7 @@ class SessionControl:
             await page.send({"type": "refused", "id": message.id, "why": why})
 
     def _submit(self, message: Judged | Turned | Climbed, name: str) -> bool:
-        """Hand a decision to the simulation; the page learns when it was taken in."""
+        """Pass a decision to the simulation; the page is informed once it is accepted."""
         kind = KINDS.index(message.decision)
         value = getattr(message, "value", 0.0)
         decision = OperatorDecision(

@@ -64,12 +64,12 @@ class Admission:
     """
 
     def __init__(self) -> None:
-        self.token = _secret()
+        self.token = _new_token()
         self._fresh = True
         self._watching = [self.token]
         self._key = ""
 
-    def knows(self, token: str) -> bool:
+    def is_token(self, token: str) -> bool:
         """Return whether a token is one of this run, used up or not."""
         return any(_is_same_word(token, known) for known in self._watching)
 
@@ -79,19 +79,19 @@ class Admission:
             return OPERATOR, self._key
         if self._fresh and _is_same_word(token, self.token):
             self._fresh = False
-            self._key = _secret()
+            self._key = _new_token()
             return OPERATOR, self._key
         return WATCHER, ""
 
     def renew(self) -> str:
         """Return a token with which a page may decide again; the last one's key stays valid."""
         if not self._fresh:
-            self.token, self._fresh = _secret(), True
+            self.token, self._fresh = _new_token(), True
             self._watching.append(self.token)
         return self.token
 
 
-def _secret() -> str:
+def _new_token() -> str:
     return secrets.token_urlsafe(24)
 
 
@@ -136,7 +136,7 @@ class Judged(_Decided):
 
 
 class Turned(_Decided):
-    """The ownship is told to turn, deg to the right."""
+    """A command to the ownship to turn, deg to the right."""
 
     decision: Literal["turn"]
     target: int = Field(ge=-1, le=10**7)
@@ -144,7 +144,7 @@ class Turned(_Decided):
 
 
 class Climbed(_Decided):
-    """The ownship is told to climb, m upward."""
+    """A command to the ownship to climb, m upward."""
 
     decision: Literal["climb"]
     target: int = Field(ge=-1, le=10**7)

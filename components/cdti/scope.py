@@ -1,4 +1,4 @@
-"""What the display shows: listens to a run's messages, and tells how things are at an instant.
+"""The content of the display: it receives a run's messages, and gives the picture at an instant.
 
 The thread of the simulation calls `listen`; any other may call `picture`. What they share is
 replaced as a whole, never changed.
@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration
+from components.atmosphere.pressure_altitude import scene_air
 from components.cdti.camera import CameraSights
 from components.cdti.contacts import (
     Contacts,
@@ -88,12 +89,13 @@ class Scope:
 
     def __init__(self, simulation: Simulation, platform: str | None = None) -> None:
         self._per_s = simulation.ticks_per_s
-        self._platform = _shown(simulation, platform)
+        self._platform = _display_platform(simulation, platform)
         on = "", self._platform
         components = {n: c for n, c in simulation.components.items() if c.context.platform in on}
         #: Blocks whose messages are shown.
         self._on_board = frozenset(components)
         self._own = OwnFlight()
+        self._air = scene_air(simulation.scene.sections)
         self._sights = CameraSights(components)
         self._contacts: Contacts | None = None
         self._alerts: _Alerts | None = None
@@ -231,6 +233,9 @@ class Scope:
                 "own": None, "contacts": [], "alerts": [], "area": [], "bands": {}, "out": []
             }  # fmt: skip
         shown = [] if contacts is None else contacts.rows_to_show(own, time_s, FORGOTTEN_S)
+        # What is reported is a pressure altitude, and compared with the ownship's own.
+        air = self._air
+        own_m = own.alt_m if air is None else float(air.pressure_altitude_m(own.alt_m))
         flights: dict[int, list[float]] = {}
         said: list[dict[str, Any]] = []
         area: list[list[float]] = []
@@ -248,7 +253,7 @@ class Scope:
             flight = [*flights.get(one[0], _UNKNOWN)]
             alt_m, climb, seen_s = reported.get(one[0], (math.nan, math.nan, -math.inf))
             if time_s - seen_s < FORGOTTEN_S and one[3] is not None:
-                one[3] = round(alt_m - own.alt_m, 2)
+                one[3] = round(alt_m - own_m, 2)
                 flight[2] = round(climb, 2) if math.isfinite(climb) else flight[2]
             one += flight
             one.append(level.get(one[0], 0))
@@ -359,7 +364,7 @@ def _flights(alerts: _Alerts) -> dict[int, list[float]]:
     return {int(t): flight for t, flight in zip(alerts.target, rounded, strict=True)}
 
 
-def _shown(simulation: Simulation, platform: str | None) -> str:
+def _display_platform(simulation: Simulation, platform: str | None) -> str:
     """Return what carries a display: what is asked for, else what carries the console.
 
     Empty where nothing is known to carry a block; `UsageError` for what carries none.

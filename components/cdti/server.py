@@ -124,13 +124,13 @@ class DisplayServer:
         """Return the address of the page."""
         return f"http://{self.authority}/?token={token}"
 
-    def show(self) -> None:
+    def announce_picture(self) -> None:
         """Let every page have a new picture when it can take one."""
         self._call_from_outside(self._announce)
 
     def tell(self, content: dict[str, Any]) -> None:
         """Tell every page."""
-        self._call_from_outside(lambda: self._tell_all(content))
+        self._call_from_outside(lambda: self._send_to_all(content))
 
     def close(self, last: dict[str, Any]) -> None:
         """Say a last word to every page and end."""
@@ -138,7 +138,7 @@ class DisplayServer:
             return
 
         async def leave() -> None:
-            await self._tell_all(last)
+            await self._send_to_all(last)
             self._stop.set()
 
         self._call_from_outside(leave)
@@ -196,7 +196,7 @@ class DisplayServer:
         hosts = request.headers.get_all("Host")
         if hosts != [self.authority]:  # another name for this address: a page of somewhere else
             return connection.respond(403, "not this host\n")
-        if not self._admission.knows(_token(request)):
+        if not self._admission.is_token(_token(request)):
             return connection.respond(
                 403, "the address lacks its token, or it is not of this run\n"
             )
@@ -236,7 +236,7 @@ class DisplayServer:
             await page.send(
                 {"type": "welcome", "role": role, "key": key, **self._control.welcome(role)}
             )
-            feeding = asyncio.create_task(self._feed(page))
+            feeding = asyncio.create_task(self._send_pictures(page))
             async for text in connection:
                 await self._receive(page, text)
         except ConnectionClosed:
@@ -261,7 +261,7 @@ class DisplayServer:
         else:
             await self._control.on_message(page, message)
 
-    async def _feed(self, page: Page) -> None:
+    async def _send_pictures(self, page: Page) -> None:
         """Send a page the newest picture whenever it can take one."""
         seen = 0
         with suppress(ConnectionClosed):
@@ -280,7 +280,7 @@ class DisplayServer:
             self._number += 1
             self._new.notify_all()
 
-    async def _tell_all(self, content: dict[str, Any]) -> None:
+    async def _send_to_all(self, content: dict[str, Any]) -> None:
         waits = [asyncio.create_task(page.send(content)) for page in self.pages]
         if waits:
             await asyncio.wait(waits, timeout=1.0)
@@ -298,31 +298,31 @@ class ConnectionLimit:
         """Return what `websockets.asyncio.server.serve` makes of a new connection."""
         return _Limited(self, *given, **options)
 
-    def take(self) -> bool:
+    def count_opened(self) -> bool:
         """Count a connection that opens; return False where there is no room for it."""
         if self._open >= self._most:
-            self._tell(f"more than {self._most} connections")
+            self._warn_once(f"more than {self._most} connections")
             return False
         self._open += 1
         return True
 
-    def give_back(self) -> None:
-        """Count a connection that was taken and is gone."""
+    def count_closed(self) -> None:
+        """Count an accepted connection that has ended."""
         self._open -= 1
 
     def on_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """Handle what the loop could not: connections may come faster than they can be dropped."""
+        """Handle errors of the event loop: connections may come faster than they can be dropped."""
         error = context.get("exception")
         if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
             self._starved = True
-            self._tell("more connections than files may be open")
+            self._warn_once("more connections than files may be open")
         elif self._starved and isinstance(error, ValueError) and "descriptor: -1" in str(error):
             # A second later the loop listens again, to a socket that the end has closed meanwhile.
             pass
         else:
             loop.default_exception_handler(context)
 
-    def _tell(self, what: str) -> None:
+    def _warn_once(self, what: str) -> None:
         if not self._said:
             self._said = True
             self._say(f"the display was sent {what}: some are dropped, the session goes on")
@@ -337,7 +337,7 @@ class _Limited(ServerConnection):
 
     def connection_made(self, transport: Any) -> None:
         """Take it, or drop it."""
-        self._taken = self._limit.take()
+        self._taken = self._limit.count_opened()
         if self._taken:
             super().connection_made(transport)
         else:
@@ -347,7 +347,7 @@ class _Limited(ServerConnection):
         """Give its place back."""
         if self._taken:
             self._taken = False
-            self._limit.give_back()
+            self._limit.count_closed()
             super().connection_lost(error)
 
 

@@ -20,7 +20,7 @@ _MANOEUVRE: dict[str, Any] = {
 
 @dataclass
 class Alerted:
-    """When which target was alerted to at which level, and when who was told to fly otherwise."""
+    """Alerts by target, level and time, and the times of commanded manoeuvres."""
 
     #: Target → level, and from when to when, s; of several alerting blocks the highest counts.
     stretches: dict[str, list[tuple[int, float, float]]] = field(default_factory=dict)
@@ -34,14 +34,14 @@ class Alerted:
         run = RecordedTables(folder, {n: read_table(folder / f"{n}.parquet") for n in names})
         result = cls()
         if "manoeuvres" in names:
-            result.manoeuvres = _by_platform(run)
+            result.manoeuvres = _manoeuvre_times_by_platform(run)
         if "alerts" in names and run.tables["alerts"].num_rows:
             result.stretches = _stretches(run)
         return result
 
     @property
     def manoeuvres_s(self) -> FloatArray:
-        """When any were told, s."""
+        """Times of all commanded manoeuvres, s."""
         return np.unique(np.concatenate([np.empty(0), *self.manoeuvres.values()]))
 
     @property
@@ -69,7 +69,7 @@ def style_of(level: int) -> tuple[str, float]:
     return _LEVELS[min(level, len(_LEVELS)) - 1]
 
 
-def _by_platform(run: RecordedTables) -> dict[str, FloatArray]:
+def _manoeuvre_times_by_platform(run: RecordedTables) -> dict[str, FloatArray]:
     """Return the times of manoeuvres by whom they steer."""
     time_s = run.numbers("manoeuvres", "time_s")
     on = np.full(len(time_s), "", dtype=object)
@@ -135,6 +135,6 @@ def draw_alerted_lines(
 
 
 def draw_manoeuvres(axes: Any, x: FloatArray, y: FloatArray) -> None:
-    """Mark where, or when, an aircraft was told to fly otherwise."""
+    """Mark where, or when, an aircraft was commanded a manoeuvre."""
     if len(x):
         axes.plot(x, y, **_MANOEUVRE, zorder=3.2, scalex=False, scaley=False, clip_on=False)

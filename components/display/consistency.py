@@ -9,7 +9,7 @@ from components.display.outcomes import NEAR_M, distances
 from components.display.tracks import COLOURS, MOST_SPREADS, STATE, DrawnTracks
 from components.messages.state_tracks import full_covariance
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
+from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts, plain_log_ticks
 from dsa_des.results.statistics import chi_square_bounds
 
 _MOST_ERRORS = 2000
@@ -93,7 +93,7 @@ def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
         plain_log_ticks(errors.yaxis)
         innovations.set_ylim(bottom=0.0)
         innovations.set_xlabel("time (s)")
-        tight(figure)
+        fit_axes_to_texts(figure)
     return path
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from components.display.recorded_rows import Detected
-from components.display.symbols import by_target, evenly
+from components.display.symbols import rows_by_target, spread_indices
 from components.geometry import line_of_sight_ned, slant_range_m
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
@@ -180,12 +180,12 @@ def positions(flights: Flights, detected: Detected) -> Positions:
     """Return for each sensor and target the true positions of its detections."""
     tracks = flights.tracks
     wanted: dict[int, list[tuple[str, FloatArray]]] = {}
-    grouped = {name: by_target(detected.target[name]) for name in detected.sensors}
+    grouped = {name: rows_by_target(detected.target[name]) for name in detected.sensors}
     most = max(10, MOST_MARKS // max(1, sum(len(groups) for groups in grouped.values())))
     for name, groups in grouped.items():
         for target, rows in groups:
             if detected.names[target] in tracks:
-                rows = rows[evenly(len(rows), most)]
+                rows = rows[spread_indices(len(rows), most)]
                 wanted.setdefault(target, []).append((name, detected.time_s[name][rows]))
     result: Positions = {name: [] for name in detected.sensors}
     for target, parts in sorted(wanted.items()):

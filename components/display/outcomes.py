@@ -199,7 +199,7 @@ class PlatformSummary:
 
 
 def select_platform(summary: Mapping[str, Any], platform: str) -> dict[str, Any]:
-    """Return of a summary's sections by block what is on a platform, and whom that comes near."""
+    """Return the sections of a summary that are of one platform: its blocks and approaches."""
     carried = summary["platforms"][platform]
     blocks = set(carried["blocks"])
     result: dict[str, Any] = {"targets": carried.get("targets", summary.get("targets"))}
@@ -227,7 +227,7 @@ class _Tracker:
     def add(self, columns: Columns, rows: IntArray) -> None:
         number = columns["track"]
         self._confirmed.update(np.unique(number[rows]).tolist())
-        self._first = _earlier(self._first, columns, rows)
+        self._first = _first_of_both(self._first, columns, rows)
         if self._at is None:
             return
         rows = rows[columns["has_range"][rows]]
@@ -248,7 +248,7 @@ class _Tracker:
         closest = np.nanargmin(apart[:, near], axis=0) if near.any() else np.empty(0, np.int64)
         for target in np.unique(closest).tolist():
             name = self._targets.names[target]
-            first = _earlier(self._firsts.get(name), columns, rows[near][closest == target])
+            first = _first_of_both(self._firsts.get(name), columns, rows[near][closest == target])
             assert first is not None
             self._firsts[name] = first
         self._squares_m2 += float((nearest[near] ** 2).sum())
@@ -266,7 +266,7 @@ class _Tracker:
         return result
 
 
-def _earlier(
+def _first_of_both(
     first: tuple[float, float] | None, columns: Columns, rows: IntArray
 ) -> tuple[float, float] | None:
     """Return time and estimated range of the first of rows and what was before, then nearest."""

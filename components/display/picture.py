@@ -105,7 +105,7 @@ def estimated_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
 
 
 def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
-    """Return rows of ``tracks`` with a range, one for each measurement held, and where it was.
+    """Return one row of ``tracks`` for each held measurement with a range, and its position.
 
     Places are as in `estimated_positions`, at ``measured_s``.
     """

@@ -212,7 +212,7 @@ def read_scans(folder: Path) -> dict[str, SensorScans]:
     """Return what the table ``scans`` of a run folder says of each sensor, by name."""
     result: dict[str, SensorScans] = {}
     for rows in iterate_row_groups(folder / "scans.parquet", _SCANS):
-        for name, (time_s, hit_s) in _by_sensor(rows).items():
+        for name, (time_s, hit_s) in _times_by_sensor(rows).items():
             first, last = float(time_s[0]), float(time_s[-1])
             scans = result.setdefault(name, SensorScans(0, first, last, None))
             scans.count += len(time_s)
@@ -232,7 +232,7 @@ def scans_between(
     for rows in iterate_row_groups(folder / "scans.parquet", _SCANS):
         if float(rows["time_s"][0]) > end_s:
             break
-        for name, (time_s, hit_s) in _by_sensor(rows).items():
+        for name, (time_s, hit_s) in _times_by_sensor(rows).items():
             first, last = np.searchsorted(hit_s, start_s), np.searchsorted(hit_s, end_s, "right")
             before[name] = hit_s[:first][-1:] if first else before.get(name, hit_s[:0])
             hits[name].append(hit_s[first:last])
@@ -247,7 +247,7 @@ def scans_between(
     }
 
 
-def _by_sensor(rows: Mapping[str, Any]) -> dict[str, tuple[FloatArray, FloatArray]]:
+def _times_by_sensor(rows: Mapping[str, Any]) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Return for each sensor of a row group its times, and those of scans with a detection."""
     return {
         name: (rows["time_s"][mine], rows["time_s"][mine[rows["detected"][mine] > 0]])

@@ -92,7 +92,10 @@ class RecordedTables:
                 f"{did_you_mean(platform, names)}"
             )
         own = self.own_name
-        tables = {name: _on(name, table, platform, own) for name, table in self.tables.items()}
+        tables = {
+            name: _rows_on_platform(name, table, platform, own)
+            for name, table in self.tables.items()
+        }
         return replace(self, tables=tables, _kept={})
 
     @cached_property
@@ -153,7 +156,7 @@ class RecordedTables:
                 )
 
     def numbers(self, table: str, name: str) -> FloatArray:
-        """Return a column as numbers, NaN where nothing stands; refuse any other."""
+        """Return a column as numbers, NaN where it is null; refuse one that is not numeric."""
         try:
             column = self._column(table, name).to_numpy(zero_copy_only=False)
             return np.asarray(column, dtype=np.float64)
@@ -198,7 +201,7 @@ def _pairs(table: Any) -> set[tuple[str, str | None]]:
     return {(row["block"], row["platform"]) for row in rows.to_pylist()}
 
 
-def _on(name: str, table: Any, platform: str, first: str) -> Any:
+def _rows_on_platform(name: str, table: Any, platform: str, first: str) -> Any:
     """Return a table's rows of blocks on a platform; of the truth all, as seen from it."""
     import pyarrow as pa
     import pyarrow.compute as pc

@@ -120,7 +120,7 @@ def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict
     common = before.keys() & after.keys()
     moved: tuple[float, float] | tuple[None, None] = (None, None)
     of = None
-    firsts, others = _firsts(before), _firsts(after)
+    firsts, others = _first_by_sensor(before), _first_by_sensor(after)
     for name in sorted(firsts.keys() & others.keys()):
         change = (others[name][1] - firsts[name][1], others[name][0] - firsts[name][0])
         if moved[0] is None or abs(change[0]) > abs(moved[0]):
@@ -154,7 +154,7 @@ def _detections(tables: Mapping[str, Any]) -> dict[tuple[str, int], tuple[float,
     }
 
 
-def _firsts(
+def _first_by_sensor(
     detections: Mapping[tuple[str, int], tuple[float, float]],
 ) -> dict[str, tuple[float, float]]:
     result: dict[str, tuple[float, float]] = {}

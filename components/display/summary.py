@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from components.messages.detections import Detections
-from components.metrics.censored import END, START, is_in_scan
+from components.metrics.rows import END, START, is_in_scan
 from dsa_des.arrays.types import IntArray
 
 #: Columns of recorded rows; of text `dsa_des.block.message.Text`.

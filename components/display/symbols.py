@@ -102,11 +102,11 @@ def block_marks(types: Mapping[str, str]) -> dict[str, Mark]:
         if kind is not None:
             again = before.get(kind, 0)
             before[kind] = again + 1
-            result[name] = replace(result[name], colour=_shade(kind.colour, again))
+            result[name] = replace(result[name], colour=_shade_colour(kind.colour, again))
     return result
 
 
-def _shade(colour: str, again: int) -> str:
+def _shade_colour(colour: str, again: int) -> str:
     parts = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
     share = _SHADES[again % len(_SHADES)] * (1 if _luminance(parts) < _LIGHT else -1)
     towards = 255 if share > 0 else 0
@@ -133,7 +133,7 @@ def stagger_marks(along_px: FloatArray, spacing_px: float, phase: float) -> IntA
     return known[np.diff(bins, prepend=-np.inf) > 0]
 
 
-def evenly(count: int, most: int) -> IntArray:
+def spread_indices(count: int, most: int) -> IntArray:
     """Return at most `most` indices spread over ``range(count)``, with both ends."""
     if count <= most:
         return np.arange(count)
@@ -150,7 +150,7 @@ def alternate_marks(
 
 def draw_marks(axes: Any, style: Mark, points: FloatArray) -> int:
     """Mark a sensor's detections (n, 2) on axes of given limits, and return how many."""
-    few = points[evenly(len(points), _MOST_MARKS)]
+    few = points[spread_indices(len(points), _MOST_MARKS)]
     axes.plot(
         few[:, 0], few[:, 1], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt,
         scalex=False, scaley=False,
@@ -158,7 +158,7 @@ def draw_marks(axes: Any, style: Mark, points: FloatArray) -> int:
     return len(few)
 
 
-def by_target(target: IntArray) -> list[tuple[int, IntArray]]:
+def rows_by_target(target: IntArray) -> list[tuple[int, IntArray]]:
     """Return each target that occurs and its rows, ascending."""
     order = np.argsort(target, kind="stable")
     starts = np.flatnonzero(np.diff(target[order], prepend=-1))
@@ -216,7 +216,7 @@ def targets_key(dense: bool) -> Any:
 
 
 def set_time_axis(axes: Any, start_s: float, end_s: float, what: str) -> None:
-    """Give axes a time from start to end, what stands on the other, and a grid."""
+    """Give axes a time from start to end, a label of the other axis, and a grid."""
     axes.set_xlim(start_s, max(end_s, start_s + 1e-9))
     axes.set(xlabel="time (s)", ylabel=what)
     add_grid(axes)

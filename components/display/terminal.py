@@ -60,7 +60,7 @@ def _show_chain(console: Any, summary: dict[str, Any], platform: str) -> None:
             console,
             "Fused instants by combination of sensors (each target counts)",
             ("sensors", "fused>"),
-            [(name, f"{count:,}") for name, count in _by_size(summary["fused"])],
+            [(name, f"{count:,}") for name, count in _sort_by_size(summary["fused"])],
         )
     if summary.get("targets"):
         _show_closest(console, summary["targets"], platform)
@@ -162,7 +162,7 @@ def outcome_lines(summary: dict[str, Any]) -> list[str]:
         of = summary.get("alerts_of", {}).get(name)
         name = f"{name} (by {' and '.join(of)})" if of else name
         lines += [
-            f"{name}: level {level} {_span_text(entry)} ({_whom_text(entry['targets'])})"
+            f"{name}: level {level} {_span_text(entry)} ({_targets_text(entry['targets'])})"
             for level, entry in levels.items()
         ] or [f"{name}: no alert"]
     for name, entry in summary.get("manoeuvres", {}).items():
@@ -206,7 +206,7 @@ def _span_text(entry: dict[str, Any]) -> str:
     return f"from {entry['first_s']:.1f} s to {entry['last_s']:.1f} s"
 
 
-def _whom_text(targets: dict[str, dict[str, float]]) -> str:
+def _targets_text(targets: dict[str, dict[str, float]]) -> str:
     if len(targets) == 1:
         return next(iter(targets))
     spans = [f"{name} {_span_text(entry)}" for name, entry in _first_targets(targets)]
@@ -241,7 +241,7 @@ def attitude_lines(traffic: dict[str, Any]) -> list[str]:
     return [line]
 
 
-def _by_size(fused: dict[str, int]) -> list[tuple[str, int]]:
+def _sort_by_size(fused: dict[str, int]) -> list[tuple[str, int]]:
     """Return combinations with the fewest sensors first."""
     return sorted(fused.items(), key=lambda item: (item[0].count("+"), item[0]))
 

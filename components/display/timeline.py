@@ -22,11 +22,11 @@ from components.display.symbols import (
     DENSE,
     MOST_NAMED,
     alternate_marks,
-    by_target,
     draw_lines,
     draw_marks,
     mark_of,
     name_lines,
+    rows_by_target,
     set_time_axis,
     targets_key,
 )
@@ -274,7 +274,7 @@ def _draw_detections(axes: Any, detected: Detected, name: str, px_per_s: float) 
     points = np.column_stack((detected.time_s[name], detected.range_m[name] / 1000))
     kept = [
         rows[alternate_marks(points[rows, 0] * px_per_s, detected.styles, name, _GOLDEN * target)]
-        for target, rows in by_target(detected.target[name])
+        for target, rows in rows_by_target(detected.target[name])
     ]
     if kept:
         draw_marks(axes, detected.styles[name], points[np.concatenate(kept)])

@@ -19,7 +19,7 @@ from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.mark import PALETTE
-from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts
 from dsa_des.running.simulation import Simulation
 
 #: Of trackers and tracks, in turn; black is the truth.
@@ -152,7 +152,7 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
             f"{many} confirmed track{'s' * (many != 1)} near targets, {false} false", loc="left"
         )
         _legend(figure, drawn, false > 0, dense)
-        tight(figure)
+        fit_axes_to_texts(figure)
         figure.subplots_adjust(top=0.93)
         _names(figure, plan, drawn, positions, own)
         if dense:

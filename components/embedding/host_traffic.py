@@ -67,7 +67,7 @@ class HostTraffic(Component):
         return _NO_END_S
 
     def setup(self) -> None:
-        """Refuse sensors that ask where aircraft are at instants of which a host says nothing."""
+        """Refuse sensors that need positions at instants that a host does not give."""
         if farthest_look(consumer.request for consumer in self.context.consumers).lasts_s > 0.0:
             raise ValueError(
                 "a sensor needs to know where aircraft are at instants between the host's calls, "

@@ -291,7 +291,7 @@ class Simulator:
     def _plane_rows(
         self, moved: Any, free: list[int], planes_asked: Sequence[int], time_s: float
     ) -> Any:
-        """Return the rows of all planes: what the host said, and the fixed ones."""
+        """Return the states of all planes: those given by the host, and the fixed ones."""
         rows = np.empty((len(planes_asked), 6))
         for row, number in enumerate(planes_asked):
             fixed = self._fixed.get(number)

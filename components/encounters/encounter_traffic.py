@@ -209,11 +209,14 @@ class _EncounterTraffic(RecordedTraffic):
     Parameters = OneEncounter
     encounter_set: EncounterSet
     index: int
+    #: Which height its altitudes are, where that is known.
+    said_height = ""
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         if (own := self.p.scripted_ownship) is not None:
             self._refuse_another_place(own.lat_deg, own.lon_deg)
+            own = own.in_air(self.air)
             self.own = flight_of(own, own.start, self.wind)
             self._let_ownship_be(own)
 
@@ -226,7 +229,7 @@ class _EncounterTraffic(RecordedTraffic):
         notes = [f"encounter {self.encounter_set.numbers[self.index]}{self.of_how_many()}"]
         if self.encounter_set.skipped:
             notes.append(f"{self.encounter_set.skipped} damaged encounters of the set were skipped")
-        return TrafficFile(own, others, 0.0, notes, notes[1:])
+        return TrafficFile(own, others, 0.0, notes, notes[1:], height=self.said_height)
 
     def of_how_many(self) -> str:
         """Return how many encounters there are to choose from, in words; nothing if any number."""
@@ -272,6 +275,7 @@ class ModelTraffic(_EncounterTraffic):
     """Traffic of one encounter that a pair of encounter models makes, by its number."""
 
     Parameters = ModelParameters
+    said_height = "pressure altitude, as the radars behind encounter models had it of transponders"
     verified = (
         Verified("sampled tracks", "exact distributions of the network, by enumeration",
                  "chi-square and 4 standard errors", "tests/encounters/test_sampling.py"),
@@ -280,7 +284,7 @@ class ModelTraffic(_EncounterTraffic):
     )  # fmt: skip
 
     def warnings(self) -> list[str]:
-        """Say which units of the models were taken for others too."""
+        """Note which units of the models are interpreted."""
         models = dict.fromkeys((self.p.file, self.p.intruder_file or self.p.file))
         notes = [f"file {path}: {note}" for path in models for note in read_model(path).notes]
         return notes + super().warnings()
@@ -331,7 +335,7 @@ def _move_set(encounter_set: EncounterSet, reference_deg: tuple[float, float]) -
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """What makes encounters of a model, and where their origin is put.
+    """The sampler of a model's encounters, and their origin.
 
     It is itself a key, of one object for all that are alike (`_model_of`).
     """

@@ -118,7 +118,7 @@ class ClosestApproachPassed(Component):
         return RunEnd(wake.ticks[over], run=wake.run[over]) if over.any() else None
 
     def _ranges_m(self, states: TrafficStates) -> tuple[FloatArray, BoolArray]:
-        """Return the distances that are taken at every row, and whether both aircraft are there."""
+        """Return the distances between pairs at every row, and whether both aircraft are there."""
         own = [getattr(states, f"own_{name}")[:, np.newaxis] for name in POSITION_FIELDS]
         others = [getattr(states, name) for name in POSITION_FIELDS]
         if self.p.between != "any two":

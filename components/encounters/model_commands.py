@@ -40,7 +40,7 @@ from components.formats.set_file import is_origin, write_set
 from components.formats.text_rows import TrafficFileError
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.errors.budgets import foreseen
+from dsa_des.errors.budgets import describe_long_work
 from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
 from dsa_des.files.output_file import check_ending, check_file, stream_file
 from dsa_des.files.output_names import reason_of, user_path
@@ -73,7 +73,7 @@ def sample_tracks(
         )
     asked = f"--count {count} --duration-s {seconds}"
     each = _RAW_ROW if raw else _FLOWN_ROW
-    if long := foreseen(asked, count * (seconds + 1), *each):
+    if long := describe_long_work(asked, count * (seconds + 1), *each):
         say(f"note: {long}", err=True)
     batches = _raw(encounter_model, seed, range(first, first + count), seconds)
     if not raw:
@@ -211,7 +211,7 @@ def generate_set(
     check_ending(path, [SET])
     check_file(path)
     rules = _rules(horizontal, vertical)
-    if long := foreseen(f"--count {count}", count, *_PAIR):
+    if long := describe_long_work(f"--count {count}", count, *_PAIR):
         say(f"note: {long}", err=True)
     about = {"models": [own.name, intruder.name], "seed": seed, "made_by": "uncorrelated pairing"}
     total, squares, attempts = 0.0, 0.0, 0

@@ -78,7 +78,7 @@ class _ModelReader:
                 name = stripped[1:].strip()
                 expected = PARTS[len(parts)] if len(parts) < len(PARTS) else None
                 if name != expected:
-                    raise self.fail(self._why_not(name, expected, parts), number)
+                    raise self.fail(self._explain_part(name, expected, parts), number)
                 rows = []
                 parts[name] = number, rows
             elif stripped:
@@ -89,7 +89,9 @@ class _ModelReader:
             raise self.fail(f"the file ends before its part '# {PARTS[len(parts)]}'")
         return parts
 
-    def _why_not(self, name: str, expected: str | None, parts: dict[str, tuple[int, _Rows]]) -> str:
+    def _explain_part(
+        self, name: str, expected: str | None, parts: dict[str, tuple[int, _Rows]]
+    ) -> str:
         if name in parts:
             return f"the part {shown_value(name)} stands there twice"
         if name not in PARTS:

@@ -314,7 +314,7 @@ def _concatenate(parts: list[Pairs]) -> Pairs:
 def draw_courses(
     first: FloatArray, second: FloatArray, climb: FloatArray, drawn: FloatArray
 ) -> FloatArray:
-    """Return courses with a density that goes with the relative speed, by rejection.
+    """Return courses with a density proportional to the relative speed, by rejection.
 
     At least 64 in 100 uniform courses are accepted, so of as many as are drawn one always is.
     """

@@ -45,7 +45,7 @@ def convert_sets(
         )
         if weights is not None:
             options = "--weights", "--weights"
-            new = _by_encounter(encounters, weights, "weight", *options, least=False)
+            new = _value_by_encounter(encounters, weights, "weight", *options, least=False)
             if not (new > 0.0).any():
                 raise UsageError(f"{weights}: all weights are 0")
             encounters = replace(encounters, weights=new)
@@ -60,10 +60,10 @@ def convert_sets(
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
     say(f"{path}: {len(encounters)} encounters")
-    _say_more(encounters)
+    _say_what_was_left_out(encounters)
 
 
-def _say_more(encounters: EncounterSet) -> None:
+def _say_what_was_left_out(encounters: EncounterSet) -> None:
     """Say what was left out of a set, and what was done to the rows of its files."""
     if encounters.skipped:
         say(f"{encounters.skipped} damaged encounters were skipped")
@@ -73,7 +73,7 @@ def _say_more(encounters: EncounterSet) -> None:
         say(f"note: and {len(encounters.notes) - _MOST_NOTES} more", err=True)
 
 
-def _by_encounter(
+def _value_by_encounter(
     encounters: EncounterSet, text: str, column: str, *options: str, least: bool
 ) -> FloatArray:
     """Return each encounter's value in a table's column; the least or the last one of several.
@@ -165,7 +165,7 @@ def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged
     )
     say(f"sum of weights {total:.6g}, effective sample size {total**2 / squares:.1f}" if squares
         else "all weights are 0")  # fmt: skip
-    _say_more(encounters)
+    _say_what_was_left_out(encounters)
     if len(indices) < len(encounters):
         say(f"closest approaches of {len(indices)} of them, evenly spread")
     headings = ["at the closest approach", "5 %", "median", "95 %", "weighted mean"]
@@ -267,7 +267,7 @@ def split_encounters(
     if scores is None or score is None:
         near = np.array([nearness(encounters, index) for index in range(len(encounters))])
     else:
-        near = _by_encounter(encounters, scores, score, "--scores", "--score", least=True)
+        near = _value_by_encounter(encounters, scores, score, "--scores", "--score", least=True)
     try:
         expected = expected_copies(near, _numbers("--levels", levels), _numbers("--copies", copies))
     except ValueError as error:

@@ -46,7 +46,7 @@ class TrackError(ValueError):
     """A model's tracks cannot be flown, or none of them is accepted; it names the model's file."""
 
 
-def _why_not(model: EncounterModel, label: str) -> str:
+def _explain_missing_variable(model: EncounterModel, label: str) -> str:
     """Return what a model is that does not have a variable that is flown."""
     there = {*model.labels}
     if {"v_1", "v_2", "hmd", "vmd"} <= there:
@@ -95,7 +95,8 @@ class TrackRules:
         for label in _FLOWN:
             if model.index_of(label) is None:
                 raise TrackError(
-                    f"{model.path}: {_why_not(model, label)} (--raw writes what it gives)"
+                    f"{model.path}: {_explain_missing_variable(model, label)} "
+                    "(--raw writes what it gives)"
                 )
         self._layer = self._index_of(LAYER)
         bins = model.bins[self._layer]

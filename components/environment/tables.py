@@ -22,7 +22,7 @@ class Weather(Parameters):
     may_change: ClassVar[tuple[str, ...]] = (
         "gas", "vapour_density_g_m3", "rain_rate_mm_h", "rain_top_m", "fog_water_g_m3",
         "fog_base_m", "fog_top_m", "fog_temperature_c", "visibility_km", "cells", "night",
-        "qnh_hpa", "temperature_offset_c",
+        "qnh_hpa", "temperature_offset_c", "temperature_profile_c",
     )  # fmt: skip
 
     gas: bool = Field(
@@ -54,8 +54,7 @@ class Weather(Parameters):
     )
     cells: tuple[WeatherCell, ...] = Field(
         default=(),
-        description="Rain and fog that are somewhere, and move: [[weather.cells]]; for radars and "
-        "cameras.",
+        description="Rain and fog that are somewhere, and move: [[weather.cells]].",
     )
 
     wind_mps: float = Field(
@@ -82,6 +81,11 @@ class Weather(Parameters):
         description="How much warmer than the standard atmosphere the air is at every height, "
         "deg C; for pressure altitudes.",
     )
+    temperature_profile_c: tuple[tuple[float, float], ...] = Field(
+        default=(),
+        description="In its place [height above sea level, temperature] in m and deg C, rising: "
+        "even in between, beyond them as far off the standard as at the nearest.",
+    )
     night: bool = Field(
         default=False,
         description="Whether there is no daylight: cameras for visible light then see nothing.",
@@ -99,6 +103,22 @@ class Weather(Parameters):
                 "fog_base_m", "fog_top_m", "fog_temperature_c", because="fog_water_g_m3 is 0"
             )
         return said
+
+    @model_validator(mode="after")
+    def _check_profile(self) -> Self:
+        rows = self.temperature_profile_c
+        heights = [height_m for height_m, _ in rows]
+        if heights != sorted(set(heights)) or not all(
+            -1000.0 <= height_m <= 30_000.0 and -120.0 <= celsius <= 60.0
+            for height_m, celsius in rows
+        ):
+            raise ValueError(
+                f"temperature_profile_c is {[list(row) for row in rows]}: its heights must rise, "
+                "from -1000 to 30000 m, with temperatures from -120 to 60 deg C"
+            )
+        if rows and self.temperature_offset_c:
+            raise ValueError("temperature_profile_c and temperature_offset_c are given: give one")
+        return self
 
     @model_validator(mode="after")
     def _fog_has_a_thickness(self) -> Self:
@@ -252,13 +272,26 @@ class Terrain(Parameters):
         description="Elevation raster whose ground hides targets, or a list of files side by side: "
         "SRTM .hgt, or GeoTIFF with the extra geotiff. Beside it no ground is known.",
     )
-    raster_offset_m: float = Field(
+    raster_offset_m: float | None = Field(
+        default=None,
+        ge=-200,
+        le=200,
+        description="Height of the raster's zero above the ellipsoid, m; by default that of sea "
+        "level, geoid_undulation_m.",
+    )
+    geoid_undulation_m: float = Field(
         default=0.0,
         ge=-200,
         le=200,
-        description="Height of the raster's zero above the ellipsoid, m: the geoid's undulation "
-        "where altitudes are above the ellipsoid.",
+        description="Height of mean sea level above the ellipsoid, the same all over the scene, m "
+        "(-107 to 86 on Earth): for pressure altitudes, heights above sea level and rasters.",
     )
+
+    @property
+    def raster_zero_m(self) -> float:
+        """Height of the raster's zero above the ellipsoid, m."""
+        given = self.raster_offset_m
+        return self.geoid_undulation_m if given is None else given
 
     def permittivity(self, wavelength_m: float | None) -> complex:
         """Return the ground's complex relative permittivity; real where no wavelength is given."""
@@ -271,7 +304,7 @@ class Terrain(Parameters):
         if self.raster is None:
             return self.height_m
         heights, inside = self.raster.raster.height(np.array([lat_deg]), np.array([lon_deg]))
-        return float(heights[0]) + self.raster_offset_m if inside[0] else None
+        return float(heights[0]) + self.raster_zero_m if inside[0] else None
 
     def without_effect(self) -> list[str]:
         """Say which keys belong to ground that there is not, and where ground is made up."""

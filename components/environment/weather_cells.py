@@ -62,12 +62,14 @@ class WeatherCell(Parameters):
     )
 
     @model_validator(mode="after")
-    def _something_in_it(self) -> Self:
+    def _check_not_empty(self) -> Self:
         if not (self.rain_rate_mm_h or self.fog_water_g_m3):
             raise ValueError("a cell has rain_rate_mm_h, fog_water_g_m3 or both")
         return self
 
-    def away(self, own_place: Sequence[FloatArray], time_s: FloatArray) -> tuple[Any, Any]:
+    def centre_offset_m(
+        self, own_place: Sequence[FloatArray], time_s: FloatArray
+    ) -> tuple[Any, Any]:
         """Return where its centre is north and east of places at times of the run, m."""
         lat_deg, lon_deg, alt_m = own_place
         lat, lon = (np.full(np.shape(lat_deg), at) for at in (self.lat_deg, self.lon_deg))
@@ -86,4 +88,4 @@ class WeatherCell(Parameters):
         azimuth, elevation, range_m = line
         level_m = range_m * np.cos(elevation)
         way = level_m * np.cos(azimuth), level_m * np.sin(azimuth)
-        return within_disc(*way, *self.away(own_place, time_s), 1000.0 * self.radius_km)
+        return within_disc(*way, *self.centre_offset_m(own_place, time_s), 1000.0 * self.radius_km)

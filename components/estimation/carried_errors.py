@@ -142,7 +142,7 @@ class ReportedErrors:
         off = np.sqrt(squared_length(ahead - way)) > _SAME_WAY * np.sqrt(squared_length(way))
         return replace(self, ahead_m=np.where(off, np.nan, ahead))
 
-    def _late_m(self, state: FloatArray, deviation: FloatArray) -> FloatArray:
+    def _late_distance_m(self, state: FloatArray, deviation: FloatArray) -> FloatArray:
         """Return how far ahead of late positions targets are that are late by one deviation."""
         way = deviation * state[3:_MOVING]
         return way if self.ahead_m is None else np.where(np.isnan(self.ahead_m), way, self.ahead_m)
@@ -203,7 +203,7 @@ class ReportedErrors:
         reported[5] -= self._sum(state, CLIMB)
         if LATENCY in self.ways:
             i = self.ways.index(LATENCY)
-            reported[:3] -= state[_MOVING + i] * self._late_m(state, self.deviation[i])
+            reported[:3] -= state[_MOVING + i] * self._late_distance_m(state, self.deviation[i])
         height = self._sum(state, HEIGHT)
         reported[0] += self._sum(state, NORTH) + self.age_s * (reported[3] - state[3])
         reported[1] += self._sum(state, EAST) + self.age_s * (reported[4] - state[4])
@@ -252,7 +252,7 @@ class ReportedErrors:
             elif way == CLIMB:
                 result[5, i], result[2, i] = -deviation, -deviation * self.age_s
             elif way == LATENCY:
-                result[:3, i] = -self._late_m(state, deviation)
+                result[:3, i] = -self._late_distance_m(state, deviation)
             elif way == HEIGHT:
                 outward = np.where(self.at_range, -up / level, 0.0)
                 result[0, i], result[1, i] = deviation * outward * cos, deviation * outward * sin
@@ -312,7 +312,7 @@ class Ages:
             moments = self._rotate_back(moments, model, state, covariance)
         speeds = np.stack([covariance[i, i] for i in (3, 4, 5)])
         error, shared = self.errors(model, state, speeds)
-        shared = _possible(shared, error, covariance)
+        shared = _clip_cross_covariance(shared, error, covariance)
         known, seen = slope.shape[1], moments.jacobian.shape[1]
         new = multiply_by_transpose(product(slope, error[:known, :known]), slope)
         with_state = multiply_by_transpose(shared[:, :known], slope)  # (d, m, n)
@@ -357,7 +357,9 @@ class Ages:
         )  # fmt: skip
 
 
-def _possible(shared: FloatArray, error: FloatArray, covariance: FloatArray) -> FloatArray:
+def _clip_cross_covariance(
+    shared: FloatArray, error: FloatArray, covariance: FloatArray
+) -> FloatArray:
     """Return what states and errors share (d, k, n), as much less as they must have in common.
 
     A track that later reports brought back to a late one knows some of what changed in between,

@@ -1,4 +1,4 @@
-"""Two estimates made one where nobody knows how their errors hang together.
+"""Fusion of two estimates whose errors have an unknown correlation.
 
 Covariance intersection weighs the information of the two by w and 1 - w. What comes out is never
 too sure, whatever the correlation of their errors. Source: S. J. Julier, J. K. Uhlmann, "A

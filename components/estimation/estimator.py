@@ -75,7 +75,7 @@ class Estimates(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PairMeasurement(Batch):
-    """What each model says of pairs of a track and a detection."""
+    """Each model's innovations and likelihoods of pairs of a track and a detection."""
 
     innovations: list[Innovation]  # Of the pairs, for every model
     residuals: list[FloatArray]  # list of (m, pairs)
@@ -119,7 +119,9 @@ class Estimator(Protocol):
         return self
 
     def carrying(self, lasts_s: tuple[float, ...]) -> "Estimator":
-        """Return the filter with errors that last so long as states; itself if it carries none."""
+        """Return the filter with lasting errors as states, of such correlation times; itself if
+        none.
+        """
         return self
 
     def expect(
@@ -251,7 +253,7 @@ def pair_measurement(
     common: FloatArray | None,
     weights: FloatArray,
 ) -> PairMeasurement:
-    """Return what every model says of pairs."""
+    """Return every model's innovations and likelihoods of pairs."""
     innovations = [one.innovation(variance, track) for one in moments]
     residuals = [residual(measured, one.expected) for one in innovations]
     distances = [distance_squared(i.root, r) for i, r in zip(innovations, residuals, strict=True)]

@@ -131,7 +131,7 @@ def mix_models(
     for j in range(many):
         weights = [transitions[i, j] * probabilities[i] / predicted[j] for i in range(many)]
         given = [
-            _entering((states[i], covariances[i]), (states[j], covariances[j]), shared,
+            _enter_model((states[i], covariances[i]), (states[j], covariances[j]), shared,
                       fresh[j] if fresh else None)
             for i in range(many)
         ]  # fmt: skip
@@ -158,7 +158,7 @@ def past_probabilities(
     return np.asarray(joint / np.maximum(sum_of(list(joint)), LEAST))
 
 
-def _entering(
+def _enter_model(
     given: tuple[FloatArray, FloatArray],
     own: tuple[FloatArray, FloatArray],
     shared: int,

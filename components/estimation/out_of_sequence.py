@@ -1,4 +1,4 @@
-"""A measurement that comes late, in one step: what the state now has to do with the state then.
+"""Late measurements in one step, by the correlation of the present state with the earlier one.
 
 With the state before the measurement's own instant and the state now, the measurements between the
 two stand for one of the state now. So the state then follows by one step of smoothing, is corrected
@@ -79,7 +79,7 @@ def retrodiction(
 def retrodiction_by_motion(
     model: Motion, now: tuple[FloatArray, FloatArray], since_s: FloatArray
 ) -> Retrodiction:
-    """Return the state at an instant before anything was known of it, by what it is now.
+    """Return the state at an instant before the first report, from the present state.
 
     Errors that are forgotten were as large then as they are now: backwards they are forgotten as
     they are forwards, and of one that is new at every instant nothing is known.

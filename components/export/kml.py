@@ -21,10 +21,13 @@ _DOT, _RING, _PLANE = "shaded_dot", "donut", "airports"
 
 
 def undulation_of(run: RecordedTables) -> float | None:
-    """Return the geoid's height above the ellipsoid (m) that a run's scene says of its terrain."""
+    """Return the geoid's height above the ellipsoid (m) that a run's scene says."""
     try:
         terrain = run.scene.get("terrain", {})
-        return float(terrain["raster_offset_m"]) if "raster" in terrain else None
+        given = terrain.get("geoid_undulation_m") or (
+            terrain.get("raster_offset_m", 0.0) if "raster" in terrain else None
+        )
+        return None if given is None else float(given)
     except (UsageError, ValueError, LookupError, TypeError):
         return None
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from components.geometry import TrajectoryState
 from dsa_des.arrays.column_values import constant
-from dsa_des.arrays.growing import Growing
+from dsa_des.arrays.growing_arrays import Growing
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 CELLS_AT_ONCE = 8192

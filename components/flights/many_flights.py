@@ -18,7 +18,7 @@ from components.flights.scripted_flights import MOST_ALT_M, ScriptedFleet, Scrip
 from components.flights.steering_plan import SteeredPart, chords, steered_parts, times_around_s
 from components.geometry import TrajectoryState, heading_from_deg, wrap_longitude_deg
 from components.messages.steering import Manoeuvre
-from dsa_des.arrays.growing import Growing
+from dsa_des.arrays.growing_arrays import Growing
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
@@ -284,7 +284,7 @@ class SteeredFleet(Growing, Fleet):
                 ownship[mine], time_s[mine], ~(len(self._ramps) + np.arange(len(mine)))
             )
             fleet._ramps = self._ramps.with_flights(
-                self._ramps_from(ownship[mine], time_s[mine], given[mine])
+                self._fly_ramps(ownship[mine], time_s[mine], given[mine])
             )
             if not len(others):
                 return fleet
@@ -305,7 +305,7 @@ class SteeredFleet(Growing, Fleet):
         around = self.each(np.repeat(ownship, times_s.shape[1]), times_s.reshape(-1))
         return around.reshape(times_s.shape)
 
-    def _ramps_from(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> Ramps:
+    def _fly_ramps(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> Ramps:
         """Return what ownships fly from their velocities at times (n,) to commanded ones."""
         _, after, which = self._split_by_manoeuvre(ownship, time_s, None)
         velocity = np.full((2, len(time_s)), np.nan)

@@ -33,7 +33,7 @@ from components.geometry import (
     heading_from_deg,
     wrap_longitude_deg,
 )
-from dsa_des.arrays.growing import Growing, GrowingArray
+from dsa_des.arrays.growing_arrays import Growing, GrowingArray
 from dsa_des.arrays.types import FloatArray, IntArray
 
 MOST_ALT_M = 1e6

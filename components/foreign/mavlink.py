@@ -123,7 +123,7 @@ class UdpLink:
             raise ValueError(f"address {address}, local_port {local_port}: {error}") from None
 
     def send(self, datagrams: list[bytes]) -> None:
-        """Send datagrams; that nobody listens shows in that nothing comes back."""
+        """Send datagrams; a peer that does not listen is noticed by its missing answers."""
         for datagram in datagrams:
             try:
                 self._socket.sendto(datagram, self._peer)
@@ -146,7 +146,7 @@ class UdpLink:
 
 
 class Mavlink(Component):
-    """Flies the ownship as an autopilot's simulation flies, which is told of the traffic.
+    """Flies the ownship as an autopilot's simulation does, to which it sends the traffic.
 
     At each instant it sends ADSB_VEHICLE of every track with states that has a range, or of every
     aircraft that is there where no tracker is wired, then HIL_STATE_QUATERNION of the ownship, and
@@ -178,7 +178,7 @@ class Mavlink(Component):
         self._rangeless = self._heard = 0
 
     def warnings(self) -> list[str]:
-        """Say that nobody measures the range without which no track is sent."""
+        """Warn that no sensor measures range: tracks without one are not sent."""
         blind = without_range(one for one in self.context.producers if one.port == "estimates")
         return [f"{blind} measures no range: no track is sent"] if blind else []
 
@@ -189,7 +189,7 @@ class Mavlink(Component):
         return {"a track has no range and is not sent": (self._rangeless, self._heard)}
 
     def run(self, wake: Wake) -> dict[str, Message] | None:
-        """Tell the autopilot what is there, and take what it says."""
+        """Send the traffic to the autopilot, and receive its state."""
         states: TrafficStates | None = wake["states"]
         if states is None:
             return None

@@ -67,7 +67,7 @@ class Link:
         self._ours = self._dialect.MAVLink(None, _SYSTEM, _COMPONENT)
 
     def heartbeat(self) -> bytes:
-        """Return the message that says that we are there."""
+        """Return a heartbeat message."""
         made = self._ours.heartbeat_encode(
             self._dialect.MAV_TYPE_ADSB, self._dialect.MAV_AUTOPILOT_INVALID, 0, 0,
             self._dialect.MAV_STATE_ACTIVE,

@@ -77,7 +77,7 @@ class ProcessParameters(Parameters):
 
     @model_validator(mode="before")
     @classmethod
-    def _beside_the_scene(cls, values: Any) -> Any:
+    def _default_folder(cls, values: Any) -> Any:
         command = values.get("command") if isinstance(values, dict) else None
         if isinstance(command, list) and command and values.get("folder") is None:
             first = command[0]
@@ -86,7 +86,7 @@ class ProcessParameters(Parameters):
         return values
 
     @model_validator(mode="after")
-    def _is_there(self) -> "ProcessParameters":
+    def _check_program(self) -> "ProcessParameters":
         program = self.program()
         if program is None:
             raise ValueError(f"command: there is no program {self.command[0]!r}")
@@ -297,7 +297,7 @@ class RewindableProcess(Process):
 
 
 class _Current:
-    """What is so of the program itself, wherever the engine has taken the block back to."""
+    """State of the program itself, which does not go back when the engine rewinds the block."""
 
     state: bytes | None = None
     restarts = 0

@@ -124,7 +124,7 @@ class ProcessLink:
                     if key.fileobj is process.stdin:
                         self._write(waiting, selector)
                     elif key.fileobj is process.stderr:
-                        if not self._hear():
+                        if not self._read_stderr():
                             selector.unregister(process.stderr)
                     else:
                         self._read(reader)
@@ -156,8 +156,8 @@ class ProcessLink:
             )
         reader.add(content)
 
-    def _hear(self) -> bool:
-        """Take what it says on standard error; whether more may come."""
+    def _read_stderr(self) -> bool:
+        """Read its standard error; return whether more may follow."""
         with suppress(BlockingIOError):
             said = os.read(self._process.stderr.fileno(), _CHUNK)
             self._words += said
@@ -174,7 +174,7 @@ class ProcessLink:
         with suppress(OSError, ValueError):
             for _ in range(64):  # what it has written so far is in the pipe
                 before = len(self._words)
-                if not self._hear() or len(self._words) == before:
+                if not self._read_stderr() or len(self._words) == before:
                     break
         said = [line.strip() for line in self._words.decode(errors="replace").splitlines()]
         said = [line for line in said if line]

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.aircraft.known_targets import known_targets
+from components.atmosphere.pressure_altitude import scene_air
 from components.foreign.reported_look import reported_looks
 from components.formats.measurement_file import Measurements, read_measurements
 from components.formats.recorded.known_kinds import captured_asterix
@@ -84,7 +85,7 @@ class RecordedSensorParameters(Parameters):
         return None if lat is None or lon is None or alt is None else (lat, lon, alt)
 
     @model_validator(mode="after")
-    def _whole_place(self) -> Self:
+    def _check_place(self) -> Self:
         keys = ("radar_lat_deg", "radar_lon_deg", "radar_alt_m")
         missing = [key for key in keys if getattr(self, key) is None]
         if 0 < len(missing) < len(keys):
@@ -183,10 +184,10 @@ class RecordedSensor(Component):
         known = [np.nanmedian(v) for v in angles if not np.isnan(v).all()]
         return SensorOffer(
             self._has("range_m"), math.sqrt(12.0 * max(known, default=0.0)),
-            self._has("range_rate_m_s"), promises=self._promises(), **same,
+            self._has("range_rate_m_s"), promises=self._promises_of_looks(), **same,
         )  # fmt: skip
 
-    def _promises(self) -> tuple[tuple[float, float], ...]:
+    def _promises_of_looks(self) -> tuple[tuple[float, float], ...]:
         """Return what looks as far apart as most here promise."""
         apart_s = np.diff(np.sort(self._read_measurements.time_s))
         return promises_of_looks(float(np.median(apart_s))) if len(apart_s) else ()
@@ -266,4 +267,6 @@ class RecordedSensor(Component):
         )
         total = len(self._tick)
         lines = [f"file: {note}" for note in self._read_measurements.notes]
+        if self.p.file.suffix in _RADARS and scene_air(self.context.sections) is not None:
+            lines.append("file: elevations are those of its flight levels, taken for heights")
         return lines + ([f"file: {late} of {total} looks come after the end"] if late else [])

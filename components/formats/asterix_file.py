@@ -19,7 +19,7 @@ from components.formats.asterix_records import (
     read_records,
 )
 from components.formats.recording import Recording
-from components.formats.sample_columns import Altitude, SampleColumn, enu_velocity
+from components.formats.sample_columns import Altitude, SampleColumn, with_velocity
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import Problems, TrafficFileError
 from components.geometry import enu_to_geodetic, radii_of_curvature, wrap_pi
@@ -141,7 +141,7 @@ def record_asterix(
         ownship = _OWNSHIP
     return table.recording(
         ownship,
-        lambda columns: {**columns, **enu_velocity(columns), "time": columns["time"] + day_s},
+        lambda columns: {**with_velocity(columns), "time": columns["time"] + day_s},
         kind="ASTERIX", units="the units of its items",
     )  # fmt: skip
 

@@ -15,13 +15,13 @@ from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.navigation.errors import navigation_errs
 from components.sensor.marks import FUSION
-from dsa_des.arrays.run_ticks import RunTicks, ranks
+from dsa_des.arrays.run_ticks import RunTicks, ranks, take_runs
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Producer
 from dsa_des.block.ladder import Verified
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import Tries, has_two
+from dsa_des.record.undone import Tries, has_two_bits
 
 #: What the sensor that gives the angles also says, and all numbers of a fused row.
 _ANGLES = (
@@ -112,7 +112,7 @@ class Fusion(Component):
         }
 
     def undone(self) -> dict[str, IntArray]:
-        """Return in which runs it never put detections of two sensors together."""
+        """Return the runs in which it never fused detections of two sensors."""
         if not self.puts_together:
             return {}
         return self._tries.undone(
@@ -120,7 +120,7 @@ class Fusion(Component):
         )
 
     def window_s(self) -> Any:
-        """Return how old a detection may be and still be put together with a new one, s."""
+        """Return how old a detection may be to be fused with a new one, s."""
         raise TypeError(f"{type(self).__name__} states no window")
 
     def with_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
@@ -153,8 +153,8 @@ class Fusion(Component):
         """
         fused, parts = self._fused_message(instants, row, target, arrivals, entries)
         if len(self.sensors) > 1:
-            of_two = has_two(fused.contributors)
-            self._tries = self._tries.add_tries(instants.run[row], fused.contributors, of_two)
+            run, of_two = take_runs(instants.run, row), has_two_bits(fused.contributors)
+            self._tries = self._tries.add_tries(run, fused.contributors, of_two)
         if self._says_what_is_new:
             fused.measurements = self._new(fused, parts, instants, arrivals, entries)
         return fused
@@ -170,7 +170,7 @@ class Fusion(Component):
         """Return what a tracker takes of fused rows: what is new, and of one instant."""
         made = np.concatenate([one.message.measured_ticks() for one in arrivals.values()])
         targets = np.concatenate([one.message.target for one in arrivals.values()])
-        used = self._recent.used_of(arrivals)
+        used = self._recent.were_used(arrivals)
         row = fused.row_of_entries
         whole, at, alone = split_used_rows(row, parts, made, used)
         used[parts[parts >= 0]] = True
@@ -239,7 +239,7 @@ class Fusion(Component):
 
 
 def largest_delay_s(sensor: Producer) -> Fraction:
-    """Return how late a sensor's looks come at most: by its own saying, and on the wire."""
+    """Return the largest delay of a sensor's looks: its own latency, and the wire's."""
     own_s = sensor.offer.latest_s if isinstance(sensor.offer, SensorOffer) else None
     return sensor.latest_s + (own_s or Fraction(0))
 

@@ -176,7 +176,7 @@ class Gated(Fusion):
         self.keep_ticks = self.gate_ticks + math.ceil(latest_s * self.context.ticks_per_s)
 
     def run(self, wake: Wake) -> FusedDetections | None:
-        """Put together what was measured within the gates of what has come."""
+        """Fuse detections whose measurements lie within each other's gates."""
         reported = {new.source: new for new in wake.arrivals("detections")}
         if not reported:
             return None

@@ -15,7 +15,7 @@ from dsa_des.block.wake import Arrivals
 
 @dataclass(frozen=True, eq=False)
 class Recent:
-    """Rows of every sensor that what comes next may be put together with."""
+    """Recent rows of every sensor, with which later ones may still be fused."""
 
     seen: Mapping[str, Arrivals] = field(default_factory=dict)
     #: By sensor, which entries of its rows and of older ones fused rows were made of, and which
@@ -47,7 +47,7 @@ class Recent:
             seen[name], _ = _rows(all_seen, used[name], young)
         return together, type(self)(seen, used, kept)
 
-    def used_of(self, arrivals: Mapping[str, Arrivals]) -> BoolArray:
+    def were_used(self, arrivals: Mapping[str, Arrivals]) -> BoolArray:
         """Return which entries were used before, of what `with_new` gave, one after the other.
 
         Of anything else none is known to be.

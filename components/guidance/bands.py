@@ -20,7 +20,7 @@ from components.guidance.intervals import (
     paint_bands,
     rename_to_recovery,
 )
-from components.guidance.kinds import ManoeuvreKind, kind_of
+from components.guidance.manoeuvre_kinds import ManoeuvreKind, kind_of
 from components.guidance.recovery import Recovery, recover, recovery_cylinder
 from components.guidance.regions import GuidedIntruders, Regions, intervals_of
 from components.guidance.situation import State

@@ -153,7 +153,7 @@ def smaller(changes: tuple[float, float]) -> float | None:
 def explain_no_steering(
     level: int, configuration: Configuration, alerter: Alerter, producers: Sequence[Producer]
 ) -> list[str]:
-    """Say where no alert reaches the level from which somebody steers, or no band is red."""
+    """Explain where no alert reaches the level at which a block steers, or no band is red."""
     said = note_unreached_level("level", level, producers)
     if configuration.corrective_level(alerter) is None:
         said.append(

@@ -50,7 +50,7 @@ class BandMemory:
         if self._counts:
             line = self._filter_colours(line)
         if self._persists:
-            line = self._persisting(now_s, line, own_value)
+            line = self._paint_remembered(now_s, line, own_value)
         # Ways out that are remembered count as long as one is needed, also where none is left now.
         if recovery is None:
             line = [b._replace(region="NONE") if b.region == "RECOVERY" else b for b in line]
@@ -116,7 +116,7 @@ class BandMemory:
                     self._queues.insert(at, (list(queue), list(queue)))
             at += 1
 
-    def _persisting(self, now_s: float, line: list[Band], own_value: float) -> list[Band]:
+    def _paint_remembered(self, now_s: float, line: list[Band], own_value: float) -> list[Band]:
         """Return the line with the remembered band painted over milder ones while it is young."""
         held = self._held
         if held is None:
@@ -240,7 +240,7 @@ class ResolutionMemory:
                 holds = young or self._shrinks[side] < shrinks
                 if not self._keeps(side, raw[side], bands, own_value, holds):
                     self._shown[side], self._shrinks[side] = raw[side], shrinks
-        self._prefer(now_s, raw, own_value, shrinks)
+        self._choose_side(now_s, raw, own_value, shrinks)
         if way is None:
             return None
         return Resolution(self._shown[_LOW], self._shown[_HIGH], self._prefers_high)
@@ -252,14 +252,14 @@ class ResolutionMemory:
         old = self._shown[side]
         if not (math.isfinite(old) and math.isfinite(raw)):
             return False
-        beyond = self._outwards(side, own_value, old)
+        beyond = self._distance_outward(side, own_value, old)
         if not (_is_surely_below(beyond, math.pi) if self._cyclic else beyond >= 0.0):
             return False
-        if not holds and not _is_surely_below(self._outwards(side, raw, old), self._near):
+        if not holds and not _is_surely_below(self._distance_outward(side, raw, old), self._near):
             return False
         return self._leads(self._band_of(side, raw, bands), band_at(bands, old), bands)
 
-    def _outwards(self, side: int, start: float, end: float) -> float:
+    def _distance_outward(self, side: int, start: float, end: float) -> float:
         """Return how far it is from one value to another, to a side."""
         way = end - start if side == _HIGH else start - end
         return way % FULL_TURN if self._cyclic else way
@@ -286,7 +286,7 @@ class ResolutionMemory:
                 return False
         return True
 
-    def _prefer(self, now_s: float, raw: list[float], own_value: float, shrinks: int) -> None:
+    def _choose_side(self, now_s: float, raw: list[float], own_value: float, shrinks: int) -> None:
         low, high = raw
         if not (math.isfinite(low) or math.isfinite(high)):
             self._prefers_high, self._since_s = False, None

@@ -122,7 +122,7 @@ class VoltagePotential(Component):
             )
             unknown = np.flatnonzero(~np.isin(run, self._known.replica))
             if len(unknown) and self.p.goal_m is not None:
-                new.goal[:, unknown] = self._goal(new.goal[:, unknown], yaw[unknown])
+                new.goal[:, unknown] = self._goal_positions(new.goal[:, unknown], yaw[unknown])
             known = self._known.latest_or_new(new) if len(self._known) else new
             seen = Others(*(part[:, rows] for part in others))
             own = own_mps[:, rows]
@@ -156,7 +156,7 @@ class VoltagePotential(Component):
         per_m = np.where(left_m < _AT_GOAL_M, 0.0, speed_mps / np.maximum(left_m, _AT_GOAL_M))
         return np.stack([east * per_m, north * per_m])
 
-    def _goal(self, place: FloatArray, yaw: FloatArray) -> FloatArray:
+    def _goal_positions(self, place: FloatArray, yaw: FloatArray) -> FloatArray:
         """Return latitudes, longitudes and altitudes (3, n) of goals ahead of places."""
         goal_m = self.p.goal_m or 0.0
         return np.stack(
@@ -185,7 +185,7 @@ class VoltagePotential(Component):
 
 
 def _dense(alerts: AlertLevels) -> tuple[Others, FloatArray, BoolArray]:
-    """Return others of each row by target, NaN where not heard, own velocities, and who is heard.
+    """Return the others' states at each row, NaN where unknown, own velocities, and who is known.
 
     Positions in alerts are the ownship's less the target's.
     """

@@ -17,7 +17,7 @@ _PARALLEL_RAD = np.radians(30.0)
 
 
 class KeptApart(NamedTuple):
-    """What is to be kept: a radius, times so much where one steers, within a time."""
+    """The separation to keep: a radius, its factor while steering, and the lookahead."""
 
     radius_m: float
     margin: float

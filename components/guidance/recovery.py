@@ -8,7 +8,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Configuration
 from components.guidance.intervals import Interval
-from components.guidance.kinds import Conflicts, kind_of
+from components.guidance.manoeuvre_kinds import Conflicts, kind_of
 from components.guidance.regions import GuidedIntruders, Regions, has_interval, intervals_of
 from components.guidance.situation import Detector, State
 from components.well_clear.tcas import recovery_sizes_m

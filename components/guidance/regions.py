@@ -6,7 +6,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration, Level
 from components.guidance.intervals import DOUBLES_APART, TINY, Interval, clear_intervals
-from components.guidance.kinds import Conflicts, ManoeuvreKind
+from components.guidance.manoeuvre_kinds import Conflicts, ManoeuvreKind
 from components.guidance.situation import Detector, State
 from components.well_clear.detection import Bounds, select_bounds
 from components.well_clear.relative_motion import is_surely_less, nearly_equal

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from components.atmosphere.infrared import haze_share_at
 from components.atmosphere.visibility import KOSCHMIEDER
 from components.geometry import sector_width_rad, unit_vector
-from components.laser.link import (
+from components.laser.range_equation import (
     laser_power_w,
     scan_detection_probability,
     shots_on_target,
@@ -19,16 +19,15 @@ from components.laser.link import (
 )
 from components.optical.area_of_cells import area_of_cells
 from components.optical.detection import detection_probability, deviations_of_exceedance
-from components.optical.weather_effects import obscuration
+from components.optical.weather_effects import TRANSMISSION, CellsInTheWay, obscuration
 from components.radar.beam import BeamSweep, SweepingSensor
 from components.radar.measurement import range_variance
 from components.sensor.cued_looks import refuse_cues
 from components.sensor.ladder_values import measure_cells
-from components.sensor.look import Cells, Look
+from components.sensor.look import Cells, Look, values_of
 from components.sensor.marks import LASER
 from components.sensor.parameters import RangeErrorParameters, SensorParameters
 from components.sensor.sensor import CUED_INPUTS
-from components.sensor.weather_cells import cells_warnings
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable
@@ -179,21 +178,22 @@ SHOTS = Ladder(
 class ScanningLaser(SweepingSensor):
     """A laser that scans a narrow field and ranges by time of flight.
 
-    Echoes follow the laser range equation (`components.laser.link`) for a target larger than the
-    beam, a small one and a wire; each aircraft's ``laser`` says what is hit. A shot's amplitude is
-    detected where with Gaussian noise it reaches the threshold of ``false_alarm_probability``; a
-    scan detects by ``hits_needed`` of the shots that its pattern puts on the target. ``snr_db`` is
-    20 lg of the strongest echo's amplitude over noise, confidence that over the threshold in dB.
-    With ``errors = "signal"`` range errs by pulse length over amplitude, and angles by anywhere in
-    the beam. Isolated false alarms are not reported: systems reject them pixel by pixel.
+    Echoes follow the laser range equation (`components.laser.range_equation`) for a target larger
+    than the beam, a small one and a wire; each aircraft's ``laser`` says what is hit. A shot's
+    amplitude is detected where with Gaussian noise it reaches the threshold of
+    ``false_alarm_probability``; a scan detects by ``hits_needed`` of the shots that its pattern
+    puts on the target. ``snr_db`` is 20 lg of the strongest echo's amplitude over noise, confidence
+    that over the threshold in dB. With ``errors = "signal"`` range errs by pulse length over
+    amplitude, and angles by anywhere in the beam. Isolated false alarms are not reported: systems
+    reject them pixel by pixel.
     """
 
     mark = LASER
     measures_range = True
     Parameters = LaserParameters
     inputs = CUED_INPUTS
-    hooks = (EXTINCTION,)
-    effects: ClassVar[tuple[Effect, ...]] = (LaserExtinction(), BeamSweep())
+    hooks = (EXTINCTION, TRANSMISSION)
+    effects: ClassVar[tuple[Effect, ...]] = (LaserExtinction(), CellsInTheWay(), BeamSweep())
     ladders = (SHOTS,)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
@@ -211,10 +211,6 @@ class ScanningLaser(SweepingSensor):
         """Take what the scene's air does to a pulse, and refuse cues."""
         refuse_cues(self, "its pattern is fixed, with one threshold")
         self._extinction_per_m = self.built_one(EXTINCTION) or 0.0
-
-    def warnings(self) -> list[str]:
-        """Say that cells of weather have no effect."""
-        return [*super().warnings(), *cells_warnings(self)]
 
     def snr_and_shots(self, cells: Cells) -> tuple[FloatArray, FloatArray]:
         """Return each cell's amplitude over noise in one shot, and the mean shots of a scan."""
@@ -240,6 +236,8 @@ class ScanningLaser(SweepingSensor):
             reflectivity=cells.of_target(column("laser.reflectivity")),
             extinction_per_m=self._extinction_per_m,
         )  # fmt: skip
+        for left in self.built(TRANSMISSION):
+            power_w = power_w * values_of(self, left, cells) ** 2
         snr = np.minimum(power_w / self.p.noise_equivalent_power_w, _STRONGEST)
         if self.p.pattern == "one_shot":
             return snr, np.ones(len(cells))

@@ -20,7 +20,7 @@ from dsa_des.block.effect import Effect, Hook, Verdict
 
 
 class Hides(Protocol):
-    """Tells which targets something stands before."""
+    """Finds the targets that terrain or the Earth's limb hide."""
 
     def __call__(self, own: Any, other: Any, present: BoolArray, /) -> BoolArray:
         """Return which of the targets that are `present` are hidden, from states of both."""
@@ -90,7 +90,7 @@ class Mountains(Effect[Hides]):
         raster = terrain.raster.raster
         return _ask_for_present(
             lambda a, b: is_behind_terrain(
-                a, b, raster, offset_m=terrain.raster_offset_m, refraction=terrain.refraction
+                a, b, raster, offset_m=terrain.raster_zero_m, refraction=terrain.refraction
             )
         )
 

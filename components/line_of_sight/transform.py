@@ -20,7 +20,7 @@ from components.line_of_sight.earth_effects import (
     HIDES,
     terrain_section,
 )
-from components.line_of_sight.rungs import REFERENCE, PickedModels, pick_rung, seeming_look
+from components.line_of_sight.model_choice import REFERENCE, PickedModels, pick_rung, seeming_look
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import RelativeTargets, TrafficStates
 from components.navigation.errors import OWNSHIP, NavigationErrors

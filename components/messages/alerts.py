@@ -97,7 +97,7 @@ def contact_name(names: tuple[str, ...], contact: int) -> str | None:
 
 
 class AlertsOffered(NamedTuple):
-    """What a block says of the alerts that it sends."""
+    """What a block offers of the alerts that it sends."""
 
     levels: int  # Of the alerter, which is the highest that may come
     period_s: float  # Between its scans

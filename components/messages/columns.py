@@ -1,4 +1,4 @@
-"""Frames that columns speak of, and groups of columns that several messages have."""
+"""Frames of columns, and groups of columns that several messages have."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -167,7 +167,7 @@ class Velocities(Manoeuvres):
 
 @dataclass(eq=False)
 class ChosenSides(Message):
-    """Which side one who steers has chosen, told to others that coordinate with it.
+    """The side of a manoeuvre that an aircraft has chosen, sent to others that coordinate with it.
 
     Parameters
     ----------

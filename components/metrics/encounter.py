@@ -13,15 +13,18 @@ import numpy as np
 from pydantic import Field
 
 from components.arguments.units import FOOT_M
-from components.metrics.censored import END, START, censoring_text, is_in_scan
 from components.metrics.detection import ANY, DECLARED, DeclarationParameters, declarations
 from components.metrics.flown_flights import FlownMetric, each_alone
 from components.metrics.losses import closest, losses_s
 from components.metrics.rows import (
+    END,
     SCANS,
+    START,
     PlatformParameters,
     TargetParameters,
+    censoring_text,
     earliest,
+    is_in_scan,
     is_named,
     sensors_of,
     values_of_target,
@@ -29,7 +32,7 @@ from components.metrics.rows import (
 from components.metrics.separation import RelativeFlight, traffic_block
 from components.well_clear.volume import PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
-from dsa_des.replicas.times_out import blocks_that_may_be_out, out_between, times_out
+from dsa_des.replicas.times_out import blocks_that_may_be_out, is_out_between, times_out
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, RATIO, Group, RatioOf, Result, recorded_by
 
@@ -378,7 +381,7 @@ class AlertTimes(FlownMetric):
                 out = group.cached(
                     times_out, lambda: times_out(group.scene, group.replicas, group.duration_s)
                 )
-                due = out_between(out, self._behind[name], lost_s - self.p.late_s, lost_s)
+                due = is_out_between(out, self._behind[name], lost_s - self.p.late_s, lost_s)
                 event = (missed & due).any(axis=1)
                 values[f"alert_missed_while_out.{name}"] = event.astype(float)
         return values

@@ -380,7 +380,7 @@ class PlatformTracks(Metric):
         if self._flown is not None:
             self.tables = {**self._flown.tables, **self.tables}
 
-    def mine(self, blocks: Sequence[str]) -> list[str]:
+    def blocks_on_board(self, blocks: Sequence[str]) -> list[str]:
         """Return those of some blocks that are on the platform."""
         return [*blocks] if self._flown is None else self._flown.on_platform(blocks)
 
@@ -393,4 +393,4 @@ class PlatformTracks(Metric):
 
     def coverage(self, scene: Scene, flights: Sequence[Any]) -> Coverage:
         """Return what of these flights the platform's sensors cover."""
-        return Coverage(scene, flights, self.mine([*scene.blocks]))
+        return Coverage(scene, flights, self.blocks_on_board([*scene.blocks]))

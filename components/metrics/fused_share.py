@@ -37,7 +37,7 @@ _SIGMAS = 6.0
 
 
 class FusedShare(TargetMetric):
-    """Share of one sensor's detections that were put together with one of another sensor.
+    """Share of one sensor's detections that were fused with one of another sensor.
 
     ``fused_share.ir_with_radar`` counts the detections of ir: those that occur, at their own
     instant or while they are held, in a fused line of sight to which radar contributed.

@@ -1,4 +1,4 @@
-"""First losses of separation and closest approaches, and how somebody is met there.
+"""First losses of separation and closest approaches, and the geometry of the meeting.
 
 Results of many flights are those flight by flight, to the bit.
 """
@@ -158,7 +158,7 @@ def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, fl
             if wider[0] >= limits[0] and wider[1] >= limits[1]:
                 maybe &= ~np.isnan(result[rows, before])
         some = np.flatnonzero(maybe)
-        apart = partial(_of_some, together.level_distances_m, some)
+        apart = partial(_states_of_some, together.level_distances_m, some)
         result[rows[some], k] = first_inside_cylinder(
             apart, (np.maximum(first_s, 0.0)[some], np.minimum(last_s, end_s)[some]),
             closing_mps[some], *limits,
@@ -195,8 +195,8 @@ def _nearest(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]
     for some, times in looks:
         mine = Approaches(best.time_s[some], best.range_m[some])
         closest_approaches(
-            partial(_of_some, together.own_at, some),
-            partial(_of_some, together.target_at, some),
+            partial(_states_of_some, together.own_at, some),
+            partial(_states_of_some, together.target_at, some),
             times,
             closing_speed_mps=together.closing_mps()[some],
             present_s=(first_s[some], np.minimum(last_s, ends_s)[some]),
@@ -245,7 +245,7 @@ def first_within_s(
     return result
 
 
-def _of_some(at: Any, some: IntArray, flight: IntArray, time_s: FloatArray) -> Any:
+def _states_of_some(at: Any, some: IntArray, flight: IntArray, time_s: FloatArray) -> Any:
     return at(some[flight], time_s)
 
 
@@ -351,7 +351,7 @@ def nearest_in_runs(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
 
 
 class _Nearest(NamedTuple):
-    """Runs in which somebody is met, and of each whose flight is nearest, and when."""
+    """Runs in which another aircraft is met, with the nearest one of each and its time."""
 
     runs: list[int]
     flights: IntArray

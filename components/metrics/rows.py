@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from components.metrics.censored import START, censoring_text, is_in_scan
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Parameters
@@ -14,6 +13,29 @@ from dsa_des.block.message import Columns, Text
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import NUMBER, TRIALS, Group, Metric, Result, recorded_by
+
+#: How the two ends of a run are called.
+START, END = "the start", "the end of the run"
+#: What is said of what did not happen within the run.
+NEVER = "never"
+
+
+def is_in_scan(time: FloatArray | int, scan: FloatArray | int) -> BoolArray:
+    """Return which events lie in the first (or last) scan, which may have cut them off."""
+    return np.equal(time, scan)
+
+
+def censoring_text(at: AnyArray, values: FloatArray | None = None) -> AnyArray:
+    """Return what a study's column says of values: ``at the start``, ``never`` or nothing.
+
+    `at` is where each is cut off, empty where it is not; values are NaN where it did not happen, if
+    that is worth saying.
+    """
+    result = np.array([f"at {where}" if where else None for where in at.tolist()], dtype=object)
+    if values is not None:
+        result[np.isnan(values)] = NEVER
+    return result
+
 
 FUSED = "fused"
 #: Columns of the sensors' scans that `scan_time_s` needs.

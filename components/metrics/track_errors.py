@@ -89,7 +89,7 @@ class ErrorsByRange(PlatformTracks):
         columns: Any = group.tables[_TABLE]
         kept = is_held(columns["track_status"]) & np.asarray(columns["has_range"], dtype=bool)
         names = columns["block"].names
-        aboard = [names.index(name) for name in self.mine(names)]
+        aboard = [names.index(name) for name in self.blocks_on_board(names)]
         kept &= np.isin(columns["block"].codes, aboard)
         replica = np.asarray(columns["replica"])[kept]
         rows = np.flatnonzero(kept)

@@ -113,7 +113,7 @@ class Tracking(PlatformTracks):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        known, block = self.mine(recorded_by(scene, _TABLE)), self.p.block
+        known, block = self.blocks_on_board(recorded_by(scene, _TABLE)), self.p.block
         if block is not None and block not in known:
             raise ValueError(f"block: {block!r} tells no tracks{did_you_mean(block, known)}")
         self._ends_s: list[float] = []
@@ -156,7 +156,7 @@ class Tracking(PlatformTracks):
             tally, names = self._tally(
                 columns, mine, confirmed, flights[1:], float(group.duration_s[number])
             )
-            first = _first_detections(group.tables["detections"], number, self.mine)
+            first = _first_detections(group.tables["detections"], number, self.blocks_on_board)
             entered = coverage.entered_s(self.p.step_s, float(group.duration_s[number]))
             values = tally.results(names, first, entered, float(group.duration_s[number]))
             values |= innovation_results(*self._innovations(columns, mine[confirmed[mine]]))
@@ -168,7 +168,7 @@ class Tracking(PlatformTracks):
 
     def _is_asked_for(self, column: Any, scene: Scene) -> Any:
         """Return which rows are of the block that is asked for, or of those that are last."""
-        names = self.mine(column.names)
+        names = self.blocks_on_board(column.names)
         fed = {
             source for source, target in scene.graph.edges if source in names and target in names
         }
@@ -191,7 +191,7 @@ class Tracking(PlatformTracks):
         key = _keys(columns)
         first, confirmed_row = np.unique(key[rows[kept[rows]]], return_index=True)
         confirmed_s = columns["time_s"][rows[kept[rows]][confirmed_row]]
-        instant, row = _standing(columns, rows, grid)
+        instant, row = _valid_rows(columns, rows, grid)
         instant, row = instant[kept[row]], row[kept[row]]
         order = np.lexsort((row, instant))
         instant, row = instant[order], row[order]
@@ -241,7 +241,7 @@ def _keys(columns: Any) -> IntArray:
     return columns["block"].codes * (track.max(initial=0) + 1) + track
 
 
-def _standing(columns: Any, rows: IntArray, grid: FloatArray) -> tuple[IntArray, IntArray]:
+def _valid_rows(columns: Any, rows: IntArray, grid: FloatArray) -> tuple[IntArray, IntArray]:
     """Return grid instants (indices) and the rows valid at them, block by block.
 
     A report stands from its own instant until its block's next one. A block reports all of its

@@ -252,7 +252,7 @@ class NavigationReport(_Navigation[Reporting]):
         noise = navigation_noise(block.context) if block.turned_by_belief else (none, none)
 
         def report(detections: Detections, targets: RelativeTargets, rows: IntArray) -> Detections:
-            return with_navigation_noise(add_horizon_angles(detections, targets, rows), *noise)
+            return add_navigation_variances(add_horizon_angles(detections, targets, rows), *noise)
 
         return report
 
@@ -275,7 +275,7 @@ def add_horizon_angles(
     return replace(detections, extras={**detections.extras, **added})
 
 
-def with_navigation_noise(
+def add_navigation_variances(
     detections: Detections, position_m: Three, attitude_rad: Three
 ) -> Detections:
     """Add to a report's variances those of the pose that its measurements are turned by."""

@@ -90,7 +90,7 @@ class Console(Component):
         return sent
 
     def acknowledge(self, taken: Sequence[Taken]) -> None:
-        """Tell whoever decided that what was due is taken in, in its order."""
+        """Acknowledge the due decisions to their senders, in order."""
 
     def _schedule_command(self, time_s: float, decision: OperatorDecision) -> Taken:
         """Return when a decision is flown, and what it replaces.
@@ -251,7 +251,7 @@ class Human(Console):
             pending.taken(one)
 
     def warnings(self) -> list[str]:
-        """Say that nobody is there."""
+        """Warn that no operator is connected."""
         if self.desk is not None:
             return []
         return ["nobody is at the console and nothing is decided: dsa-des cdti puts a person there"]

@@ -259,7 +259,7 @@ class Stochastic(Component):
         return choosing, acting
 
     def _decides(self, mind: Mind, tick: int) -> bool:
-        """Tell whether a mind comes to a decision at an instant."""
+        """Return whether the pilot decides at an instant."""
         if mind.since is None or mind.acts_at is not None:
             return False
         early = self.p.chooses == "before_executing"

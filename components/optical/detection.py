@@ -25,7 +25,7 @@ from components.arguments.checks import (
 )
 from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.false_detections import add_false_detections, sort_by_measurement
-from components.radar.detection.output import false_alarm_count
+from components.radar.detection.detector_output import false_alarm_count
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 from dsa_des.time.clock import nanosecond_of

@@ -146,7 +146,7 @@ def _vertex(three: FloatArray) -> float:
 
 
 class Flow(NamedTuple):
-    """How far a spot has come between two pictures, pixels; all NaN where that is not told."""
+    """Displacement of a spot between two pictures, pixels; NaN where it is not measured."""
 
     x: float
     y: float
@@ -278,7 +278,7 @@ def _register_shift(first: FloatArray, second: FloatArray, noise: float) -> Flow
     shift = np.zeros(2)
     for _ in range(_STEPS):
         turned = both * np.exp(1j * (k[0] * shift[0] + k[1] * shift[1]))
-        bend = _by_axes(square, turned.real)
+        bend = _moment_matrix(square, turned.real)
         if not (bend[0, 0] > 0.0 and np.linalg.det(bend) > 0.0):
             return _NOTHING
         slope = -np.array([(k[0] * turned.imag).sum(), (k[1] * turned.imag).sum()])
@@ -297,7 +297,7 @@ def _register_shift(first: FloatArray, second: FloatArray, noise: float) -> Flow
     if float(turned.real.sum()) < _ALIKE * math.sqrt(energy[0] * energy[1]):
         return _NOTHING
     inverse = np.linalg.inv(bend)
-    covariance = power * inverse @ _by_axes(square, soft * turned.real) @ inverse
+    covariance = power * inverse @ _moment_matrix(square, soft * turned.real) @ inverse
     return Flow(float(shift[0]), float(shift[1]), math.sqrt(_largest(covariance)))
 
 
@@ -307,7 +307,7 @@ def _largest(covariance: FloatArray) -> float:
     return float(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy))
 
 
-def _by_axes(square: Any, values: FloatArray) -> FloatArray:
+def _moment_matrix(square: Any, values: FloatArray) -> FloatArray:
     xx, xy, yy = ((one * values).sum() for one in square)
     return np.array([[xx, xy], [xy, yy]])
 

@@ -8,6 +8,7 @@ import numpy as np
 from components.atmosphere.infrared import (
     BANDS,
     band_extinction_per_m,
+    haze_share_at,
     long_wave_transmission,
     mid_wave_transmission,
     precipitable_water_mm,
@@ -131,7 +132,7 @@ class ObscuringCells(Effect[CellValues]):
                 rain = share_between(low, high, -math.inf, weather.rain_top_m)
                 fog = share_between(low, high, weather.fog_base_m, weather.fog_top_m)
                 per_m = rain * float(rain_extinction_per_m(one.rain_rate_mm_h))
-                per_m += fog * _fog_per_m(infrared_band_of(block), one.fog_water_g_m3)
+                per_m += fog * _fog_per_m(block, one.fog_water_g_m3)
                 depth += per_m * cells.range_m * (within.leaves - within.enters)
             with np.errstate(under="ignore"):
                 return np.exp(-depth)
@@ -139,14 +140,31 @@ class ObscuringCells(Effect[CellValues]):
         return factor
 
 
-def _fog_per_m(band: str | None, water_g_m3: float) -> float:
-    """Return what fog takes of visible light, or of an infrared band, 1/m."""
+def _fog_per_m(block: Any, water_g_m3: float) -> float:
+    """Return what fog takes of visible light, of an infrared band or of a laser's, 1/m."""
     visibility_m = float(fog_visibility_m(water_g_m3))
     if math.isinf(visibility_m):
         return 0.0
-    if band is None:
-        return KOSCHMIEDER / visibility_m
-    return band_extinction_per_m(band, visibility_m)
+    if (band := infrared_band_of(block)) is not None:
+        return band_extinction_per_m(band, visibility_m)
+    wavelength_um = getattr(block.p, "wavelength_um", None)
+    share = 1.0 if wavelength_um is None else float(haze_share_at(visibility_m, wavelength_um))
+    return share * KOSCHMIEDER / visibility_m
+
+
+TRANSMISSION = Hook("light", CellValues, "share of each cell's light that is left, one way")
+
+
+class CellsInTheWay(ObscuringCells):
+    """The same of a laser's pulse, on each way, and of what somebody who looks out searches for."""
+
+    acts_on = TRANSMISSION
+
+    def verdict(self, block: Any) -> Verdict:
+        """Ask whether a cell comes near, and a search by contrast."""
+        if getattr(block.p, "search", "") == "round":
+            return Verdict(False, "search is 'round', which no contrast slows")
+        return super().verdict(block)
 
 
 DARKNESS = Hook("darkness", bool, "whether it is too dark to see anything")

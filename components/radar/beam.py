@@ -210,10 +210,10 @@ class Sweep:
         }
         self._ticks_per_s = block.context.ticks_per_s
 
-    def lit(
+    def illuminate(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
     ) -> LitTargets:
-        """Return the targets as the beam meets them, one row per scan.
+        """Return the targets at the instants at which the beam meets them, one row per scan.
 
         Those in a cue cone it meets as the scan begins, if the radar's beam visits such cones
         first.
@@ -338,4 +338,4 @@ class SweepingSensor(Sensor):
         """Return the targets at the instants at which the beam lights them."""
         if self._sweep is None:
             return targets, rows
-        return self._sweep.lit(targets, rows, cued), np.arange(len(rows))
+        return self._sweep.illuminate(targets, rows, cued), np.arange(len(rows))

@@ -12,7 +12,7 @@ from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.false_detections import sort_by_measurement
 from components.messages.targets import RelativeTargets
 from components.radar.detection.clutter import clutter_detection_probability
-from components.radar.detection.output import false_alarm_count, false_alarm_snr
+from components.radar.detection.detector_output import false_alarm_count, false_alarm_snr
 from components.radar.detection.threshold import Crossing
 from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS, Clutter, terrain_of
 from components.radar.measurement import FAINTEST
@@ -56,7 +56,7 @@ class NoiseReports:
             expected = self._cells.count * crossing.false_alarm_probability
             if expected > MOST_PER_SCAN:
                 raise ValueError(
-                    f"{block.noise_key()}: with {self._cells.count:,} "
+                    f"{block.describe_threshold_key()}: with {self._cells.count:,} "
                     f"resolution cells that makes {expected:,.0f} false alarms by scan, and at "
                     f"most {MOST_PER_SCAN:,.0f} are allowed; noise may cross the threshold with a "
                     f"probability of at most {MOST_PER_SCAN / self._cells.count:.3g}"
@@ -243,7 +243,7 @@ class GroundReports:
         elevation_rad = -np.arcsin(np.clip(body_to_ned(*self._body, *turned)[2], -1.0, 1.0))
         parts = [
             (depth + beam * self._cells.range, *self._clutter(own_alt_m, depth, away))
-            for depth, beam, away in self._lit(own_alt_m, elevation_rad)
+            for depth, beam, away in self._lit_cells(own_alt_m, elevation_rad)
         ]
         if not parts:
             return np.empty(0, dtype=np.int64), np.empty(0)
@@ -261,7 +261,7 @@ class GroundReports:
         crossing = np.flatnonzero(draw < extra)
         return cell[crossing], cnr[crossing]
 
-    def _lit(
+    def _lit_cells(
         self, own_alt_m: float, elevation_rad: FloatArray
     ) -> Iterator[tuple[int, IntArray, FloatArray]]:
         """Give each range cell with clutter, the beams that meet it, and where they point."""
@@ -358,7 +358,7 @@ def unlikely_false_alarms(block: Any) -> list[str]:
     if not (block.p.false_alarms and block.p.enabled):
         return []
     pfa, cells = block.crossing.false_alarm_probability, cells_of_radar(block).count
-    noise_key, own = block.noise_key(), "false_alarm_probability"
+    noise_key, own = block.describe_threshold_key(), "false_alarm_probability"
     by_default = noise_key.startswith(own) and own not in block.p.model_fields_set
     comes_to = (
         f"with {cells:,} resolution cells that makes {cells * pfa:,.3g} false alarms per scan"

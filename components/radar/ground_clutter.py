@@ -361,7 +361,7 @@ def platform_spread_m_s(
 
 
 def clutter_as_signal(parameters: Any, terrain: Any) -> list[str]:
-    """Say that clutter raises detections where the threshold stays at the noise."""
+    """Warn that clutter counts as signal where the threshold stays at the noise."""
     if terrain is None or parameters.clutter_threshold != "noise":
         return []
     return [

@@ -11,7 +11,7 @@ from components.geometry import NEAR_A_POLE_DEG, rotate_to_meridian
 from components.messages.columns import OWN_VELOCITY
 from components.messages.detections import REPORT, Detections, Reporting
 from components.messages.targets import RelativeTargets, own_velocity
-from components.radar.detection.output import measured_snr
+from components.radar.detection.detector_output import measured_snr
 from components.radar.link_budget import wavelength
 from components.sensor.look import STRENGTH, Cells, Look, Strengthening
 from dsa_des.arrays.types import FloatArray, IntArray

@@ -246,7 +246,7 @@ class FoldedClutter(Effect[Echo]):
         return Verdict(True, f"range_folds is true: clutter of every {every} km beside a target's")
 
     def build(self, block: Any) -> Echo:
-        """Return what gives the RCS at a target's range that the other ranges come to."""
+        """Return the function that gives the RCS, at a target's range, of rain at folded ranges."""
         if not self.verdict(block).simulated:
             return NoEcho(block)
         return FoldedEcho(block)

@@ -13,8 +13,8 @@ from components.aircraft.aircraft import Aircraft
 from components.aircraft.known_targets import known_targets
 from components.arguments.checks import (
     broadcast_flat,
-    check_model,
     check_not_negative,
+    check_swerling_model,
     finite,
     refuse,
     unflatten,
@@ -36,7 +36,7 @@ def fluctuating_rcs(mean_rcs_m2: ArrayLike, uniforms: ArrayLike, model: str) -> 
     Larger draws give larger RCS. Thesis eq. 22 with N = 1 (eq. 23: the exponential in power,
     Rayleigh in amplitude) and N = 2.
     """
-    name = check_model(model)
+    name = check_swerling_model(model)
     mean, draw = check_not_negative("mean_rcs_m2", mean_rcs_m2), finite("uniforms", uniforms)
     refuse("uniforms", draw, ~((draw >= 0.0) & (draw < 1.0)), "lie in [0, 1)")
     if name in ("swerling2", "swerling4"):
@@ -68,7 +68,7 @@ def scan_rcs(
     each pulse the sum of n pulses depends only on the sum of their SNR. So a steady target's Pd at
     the scan's RCS, averaged over scans, is the model's own Pd, whatever the pulses.
     """
-    name = check_model(model)
+    name = check_swerling_model(model)
     if name == "swerling0":
         return np.array(mean_rcs_m2)
     if name in ("swerling1", "swerling3"):
@@ -113,7 +113,9 @@ FLUCTUATION = Hook("RCS", ModelsOfCells, "which Swerling model each cell has")
 MEAN_RCS = Hook("mean RCS", CellValues, "each cell's mean RCS in m²")
 
 
-def _by_targets(context: Context, says: Callable[[Aircraft], str], *, otherwise: str) -> Verdict:
+def _verdict_by_targets(
+    context: Context, says: Callable[[Aircraft], str], *, otherwise: str
+) -> Verdict:
     """Return the verdict on an effect that targets call for by what one `says` they have."""
     rosters = known_targets(context)
     if not rosters:
@@ -140,7 +142,7 @@ class RcsFluctuation(Effect[ModelsOfCells]):
         """Ask the radar's ``swerling``, and where it has none each target's."""
         if block.p.swerling is not None:
             return Verdict(block.p.swerling not in (0, 5), f"swerling is {block.p.swerling}")
-        return _by_targets(
+        return _verdict_by_targets(
             block.context,
             lambda craft: f"swerling {craft.swerling}" if craft.swerling % 5 else "",
             otherwise="every target has swerling 0 or 5",
@@ -161,7 +163,7 @@ class AspectRcs(Effect[CellValues]):
         """Ask for ``aspect_rcs``, and every target for an ``rcs_table``."""
         if not block.p.aspect_rcs:
             return Verdict(False, "aspect_rcs is false")
-        return _by_targets(
+        return _verdict_by_targets(
             block.context,
             lambda craft: "an rcs_table" if craft.rcs_table else "",
             otherwise="no target has an rcs_table",

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.messages.reach import Reach
-from components.radar.detection.output import MOST_CELLS
+from components.radar.detection.detector_output import MOST_CELLS
 from components.radar.pulse_trains.ambiguity import coincident_range_m
 from components.sensor.look import Cells
 from components.sensor.parameters import RangeErrorParameters, SensorParameters

@@ -256,7 +256,7 @@ class LinkBudgetRadar(Radar):
             measured={name: values[kept] for name, values in measured.items()},
         )
 
-    def noise_key(self) -> str:
+    def describe_threshold_key(self) -> str:
         """Say which key sets how often noise crosses the threshold, and its value."""
         return f"false_alarm_probability is {self.p.false_alarm_probability:g}"
 
@@ -352,7 +352,7 @@ class ThresholdRadar(LinkBudgetRadar):
             return None
         return Crossing.from_snr(self.p.pulses_summed, self.cued_threshold_db)
 
-    def noise_key(self) -> str:
+    def describe_threshold_key(self) -> str:
         """Say which key sets how often noise crosses the threshold, and its value."""
         given = "" if self.p.threshold_db is not None else " (not given)"
         return f"threshold_db{given} is {self.threshold_db:g}"

@@ -194,7 +194,7 @@ def scans_with_company(
 
 
 def _enumerate_pairs(first: IntArray, number: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
-    """Give each asked one's index with those of a scan: so many entries from its first on."""
+    """Return pairs of an asked entry and an entry of its scan, all of each scan."""
     start, most = 0, max(1, _MOST_PAIRS // max(1, int(number.max(initial=1))))
     while start < len(first):
         part = slice(start, start + most)

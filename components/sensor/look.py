@@ -215,6 +215,11 @@ class Cells:
         roster = self.roster
         return self.target if roster.is_shared else roster.craft(self.target, self.run)
 
+    @cached_property
+    def equipped(self) -> IntArray:
+        """Where each cell's target stands in the roster's equipage, as it is then."""
+        return self.roster.equipped(self.craft, self.state_ns)
+
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
         """Return uniform draws keyed by each cell's target and scan."""
         keys = self.roster.keys_of(self.target)

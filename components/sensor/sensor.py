@@ -73,11 +73,11 @@ def count_reasons(
             for code in (EVALUATE, *SKIP_REASONS.values())
             if hides or code != HIDDEN
         }
-        of.setdefault(HIDDEN, _of_each(0, rows))
+        of.setdefault(HIDDEN, _counts_of_rows(0, rows))
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
     left_out = on_roster - targets
     if culled is None:
-        culled = _of_each(left_out, rows)
+        culled = _counts_of_rows(left_out, rows)
     else:
         skipped["absent"] = skipped["absent"] + (left_out - culled)
     skipped[CULLED] = culled
@@ -87,14 +87,14 @@ def count_reasons(
 def _count_per_row(mask: BoolArray) -> IntArray:
     """Return how many are true in each row of few columns: ten times as fast as their sum."""
     if not np.count_nonzero(mask):
-        return _of_each(0, len(mask))
+        return _counts_of_rows(0, len(mask))
     total: Any = mask[:, 0].astype(np.int8)  # a sink keeps them as narrow as they are
     for column in mask.T[1:]:
         total += column
     return total
 
 
-def _of_each(count: int, rows: int) -> IntArray:
+def _counts_of_rows(count: int, rows: int) -> IntArray:
     return constant(count, rows, np.int64)
 
 

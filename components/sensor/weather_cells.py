@@ -24,13 +24,6 @@ def weather_cells(block: Any) -> tuple[WeatherCell, ...]:
     return cells
 
 
-def cells_warnings(block: Any) -> list[str]:
-    """Say that cells of weather do nothing to a sensor, whose air is the same everywhere."""
-    if not weather_cells(block) or not block.p.enabled:
-        return []
-    return ["[weather] cells: no effect on this sensor; only weather that is everywhere has one"]
-
-
 def cells_verdict(block: Any) -> Verdict:
     """Say whether a cell comes near any line of sight of a sensor, as far as can be known."""
     cells = weather_cells(block)
@@ -65,7 +58,7 @@ def _apart_m(block: Any) -> list[float] | None:
         path = envelope.own_path
         farthest_m = _MARGIN * envelope.range_m + _MARGIN_M if envelope.range_m else -math.inf
         for cell in weather_cells(block):
-            level_m = np.hypot(*cell.away(path.place, path.time_s))
+            level_m = np.hypot(*cell.centre_offset_m(path.place, path.time_s))
             moves_m = path.moves_m + cell.speed_mps * path.half_s
             apart_m.append(float(level_m.min()) - 1e3 * cell.radius_km - moves_m - farthest_m)
     return apart_m

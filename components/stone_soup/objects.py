@@ -146,7 +146,7 @@ _UPRIGHT = 1e-9
 
 
 def rotation_offsets(to_body: FloatArray) -> FloatArray:
-    """Return the angles that stand for rotations."""
+    """Return rotations as angles."""
     # Columns along east, north, up; rows along nose, left wing, roof.
     turned = to_body[:, [1, 0, 2]] * np.array([1.0, 1.0, -1.0])[np.newaxis, :, np.newaxis]
     turned *= np.array([1.0, -1.0, -1.0])[:, np.newaxis, np.newaxis]

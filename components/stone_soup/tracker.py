@@ -14,10 +14,10 @@ from components.messages.detections import SensorOffer, sensor_offers
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import COVARIANCE, DELETED, StateTracks
 from components.sensor.marks import TRACKER
-from components.stone_soup.follower import Followed, Follower
 from components.stone_soup.library import Repeatable, require_stone_soup
+from components.stone_soup.reported_tracks import Followed, Follower
+from components.tracking.due_detections import ACTS_EVERY_S, Promises
 from components.tracking.out_of_sequence import LookCount, latest_s
-from components.tracking.promises import ACTS_EVERY_S, Promises
 from components.tracking.reported_errors import folded_ranges, unknown_latency
 from components.tracking.scans import Scans, scans_of, split_due_looks
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -57,7 +57,7 @@ class StoneSoupParameters(Parameters):
     state_size: int = Field(default=6, ge=6, le=100, description="Components of a state.")
 
     @model_validator(mode="after")
-    def _possible(self) -> Any:
+    def _check_places_of_state(self) -> Any:
         places = (*self.position_mapping, *self.velocity_mapping)
         if len(set(places)) != 6 or min(places) < 0 or max(places) >= self.state_size:
             raise ValueError(

@@ -205,13 +205,16 @@ class Active(CooperativeSensor):
     def answer_probability(self, cells: Cells) -> FloatArray:
         """Return the probability that each cell's aircraft answers if it is asked."""
         every = np.arange(len(cells))
-        return self._answer_probability(cells, every, cells.range_m, cells.body_azimuth_rad)
+        seen = cells.range_m, cells.body_azimuth_rad
+        return self._answer_probability(cells, every, *seen, cells.state_ns)
 
     def _answer_probability(
-        self, cells: Cells, which: AnyArray, range_m: FloatArray, azimuth_rad: FloatArray
-    ) -> FloatArray:
+        self, cells: Cells, which: AnyArray, range_m: FloatArray, azimuth_rad: FloatArray,
+        instant_ns: IntArray,
+    ) -> FloatArray:  # fmt: skip
         """Return the same of some cells, at ranges and bearings of some instant."""
-        equipage, craft = cells.roster.equipage, cells.craft[which]
+        equipage = cells.roster.equipage
+        craft = cells.roster.equipped(cells.craft[which], instant_ns)
         mode_s, mode_c = equipage.mode_s[craft], equipage.mode_c[craft]
         within = range_m <= reach_m(azimuth_rad, mode_s)
         in_1_s = np.where(mode_s, self.p.mode_s_in_1_s, self.p.mode_c_in_1_s)
@@ -234,7 +237,7 @@ class Active(CooperativeSensor):
         detected[answered] = placed = self.has_position(cells, answered, now)
         answered, now = answered[placed], now[placed]
         extras = empty_report_columns(len(cells))
-        equipage, craft = cells.roster.equipage, cells.craft[answered]
+        equipage, craft = cells.roster.equipage, cells.equipped[answered]
         extras["address"][answered] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)
         extras["reported_alt_m"][answered] = now
         extras["reported_s"][answered] = cells.state_ns[answered] / NANOSECONDS
@@ -276,7 +279,8 @@ class Active(CooperativeSensor):
         there = then["present"] & (instant_ns >= 0)
         hidden = then.get("hidden")
         reason = self._reach_from_body.decide(azimuth, elevation, then["range_m"], there, hidden)
-        probability = self._answer_probability(cells, which, then["range_m"], azimuth)
+        seen = then["range_m"], azimuth
+        probability = self._answer_probability(cells, which, *seen, instant_ns)
         heard = np.asarray((reason == EVALUATE) & (probability > 0.0))
         if self.p.replies == "rounds":
             some = np.flatnonzero(heard)
@@ -325,7 +329,8 @@ class Active(CooperativeSensor):
             return range_m
         keys = cells.roster.keys_of(cells.target[which])
         drawn = self._ranges(keys, instant_ns, run=cells.run[which])
-        bias = np.where(cells.roster.equipage.mode_s[cells.craft[which]], *RANGE_BIAS_M)
+        craft = cells.roster.equipped(cells.craft[which], instant_ns)
+        bias = np.where(cells.roster.equipage.mode_s[craft], *RANGE_BIAS_M)
         return np.maximum(range_m + bias + RANGE_ERROR_M * drawn, 1.0)
 
     def _measure(
@@ -359,7 +364,7 @@ class Active(CooperativeSensor):
             variances = variances_of_replies(
                 ned, deviation**2 + attitude_rad[0] ** 2, max(position_m[:2]) ** 2, altitude,
                 self._step_ft(cells, detected, altitude),
-                cells.roster.equipage.mode_s[cells.craft[detected]],
+                cells.roster.equipage.mode_s[cells.equipped[detected]],
             )  # fmt: skip
         across, along, vertical = variances
         vertical = vertical + self.p.pressure_deviation_m**2
@@ -373,7 +378,7 @@ class Active(CooperativeSensor):
     ) -> dict[str, FloatArray]:
         """Return the deviations of all errors, as `TOLD`."""
         none = np.zeros(len(detected))
-        mode_s = cells.roster.equipage.mode_s[cells.craft[detected]]
+        mode_s = cells.roster.equipage.mode_s[cells.equipped[detected]]
         position_m, attitude_rad = navigation_noise(self.context)
         own = own_velocity(cells, detected)
         altimetry_ft2 = altimetry_variance_ft2(altitude_m / FOOT_M)
@@ -394,5 +399,5 @@ class Active(CooperativeSensor):
         return altitude_step_ft(altitude_m / FOOT_M, self._mode_step_ft(cells, which))
 
     def _mode_step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
-        mode_s = cells.roster.equipage.mode_s[cells.craft[which]]
+        mode_s = cells.roster.equipage.mode_s[cells.equipped[which]]
         return np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)

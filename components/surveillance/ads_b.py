@@ -91,6 +91,14 @@ class AdsBParameters(CooperativeParameters):
         description="Whether values are rounded as in the messages: compact positions, 25 ft, "
         "whole knots, 64 ft/min.",
     )
+    heights: Literal["reported", "by_own_altimeter", "geometric"] = Field(  # type: ignore[assignment]
+        default="reported",
+        description="What reported pressure altitudes are taken for: 'reported', heights as they "
+        "are; 'by_own_altimeter', heights once the difference between the ownship's own pressure "
+        "altitude and its height by navigation is taken off. 'geometric': the heights above the "
+        "ellipsoid that aircraft send with their velocities are taken in their place (ads_b.gva); "
+        "who sends none is not placed.",
+    )
     velocity_age_s: float = Field(
         default=3.0, ge=0.5, le=LONGEST_S,
         description="Oldest velocity message that goes with a position, s.",
@@ -112,6 +120,8 @@ class AdsBParameters(CooperativeParameters):
         if self.reception != "fitted":
             around = "aircraft_around", "airports_around"
             said += self.idle(*around, because=f"reception is {self.reception!r}")
+        if self.heights == "geometric":
+            said += self.idle("pressure_deviation_m", because="heights is 'geometric'")
         return said
 
     def reach(self) -> Reach:
@@ -204,11 +214,16 @@ class AdsB(CooperativeSensor):
         self._received = {kind: self.stream(f"{kind} received") for kind in self._clocks}
         self._broadcasts = Broadcasts(streams, parameters.position_errors, parameters.compact)
 
+    @property
+    def _is_geometric(self) -> bool:
+        return bool(self.p.heights == "geometric")
+
     def offer(self, port: str) -> Any:
         """Say that all variances differ from report to report."""
         offer: SensorOffer = super().offer(port)
         errs = self.p.position_errors != "none" or self.p.compact or self.p.pressure_deviation_m
-        told = errors_of_broadcast(self.p.position_errors) if errs else ()
+        model = self.p.position_errors, self._is_geometric
+        told = errors_of_broadcast(*model) if errs else ()
         # Of targets that may be anything some may be late.
         late = [(one.equipage.late_s > 0.0).any() for one in known_targets(self.context)]
         told = (*told, LATE) if any(late or [True]) else told
@@ -216,7 +231,7 @@ class AdsB(CooperativeSensor):
         return replace(
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
-            lasting=lasting_errors(self.p.position_errors), unstated_across_m2=0.0,
+            lasting=lasting_errors(*model), unstated_across_m2=0.0,
             promises=promises_of_looks(
                 float(1 / self.p.scan_rate_hz), promises_by_range(self.law, far_m)
             ),
@@ -237,20 +252,20 @@ class AdsB(CooperativeSensor):
         """Receive what was sent up to each scan, and decode the last of it."""
         extras = empty_report_columns(len(cells))
         moves = np.full((3, len(cells)), np.nan)
-        equipage = cells.roster.equipage
-        sends = np.flatnonzero(equipage.ads_b[cells.craft])
+        sends = np.flatnonzero(cells.roster.ever_broadcasts[cells.craft])
         reported, number, sent_ns = self._last_received("position", cells, sends)
         detected = np.zeros(len(cells), dtype=bool)
         detected[reported] = True
         if len(reported):
             self._report(cells, reported, number, sent_ns, extras)
-            placed = self.has_position(cells, reported, extras["reported_alt_m"][reported])
+            taken = extras["reported_height_m" if self._is_geometric else "reported_alt_m"]
+            placed = self.has_position(cells, reported, taken[reported])
             detected[reported], reported = placed, reported[placed]
             moves[:, reported] = own_velocity(cells, reported)
             detected = self.of_others(cells, detected, extras["address"])
         signal = {f"own_{axis}": moves[i] for i, axis in enumerate(("north", "east", "down"))}
         self._rows = cells.row, moves
-        confidence = np.where(detected, equipage.nacp[cells.craft], 0.0)
+        confidence = np.where(detected, extras["nacp"], 0.0)
         return Look(detected, confidence, extras, signal=signal)
 
     def _last_received(
@@ -268,8 +283,10 @@ class AdsB(CooperativeSensor):
             senders.keys, senders.run, now_ns, count
         )
         counts &= sent_ns > oldest_ns[:, np.newaxis]
-        silent_after_s = cells.roster.equipage.silent_after_s[senders.craft]
-        counts &= sent_ns < (silent_after_s * NANOSECONDS)[:, np.newaxis]
+        roster = cells.roster
+        craft = roster.equipped(cells.craft[asked][:, np.newaxis], sent_ns)
+        counts &= roster.equipage.ads_b[craft]
+        counts &= sent_ns < roster.equipage.silent_after_s[craft] * NANOSECONDS
         row, column = np.nonzero(counts)
         if not len(row):
             return none, none, none
@@ -302,25 +319,26 @@ class AdsB(CooperativeSensor):
         extras: dict[str, AnyArray],
     ) -> None:
         """Fill in what was decoded of some cells."""
-        equipage, craft = cells.roster.equipage, cells.craft
+        equipage, senders = cells.roster.equipage, Transponders.from_cells(cells, reported, sent_ns)
         sent = self._states_when_sent(cells, reported, number, sent_ns)
-        position = self._broadcasts.position(
-            equipage, Transponders.from_cells(cells, reported), sent
-        )
+        position = self._broadcasts.position(equipage, senders, sent)
         for name, values in zip(POSITION_FIELDS, position, strict=True):
             extras[f"reported_{name}"][reported] = values
         extras["reported_s"][reported] = sent_ns / NANOSECONDS
         for name in ("address", "nacp", "nic"):
-            extras[name][reported] = getattr(equipage, name)[craft[reported]]
+            extras[name][reported] = getattr(equipage, name)[senders.craft]
         moving, number, sent_ns = self._last_received("velocity", cells, reported)
         if not len(moving):
             return
+        senders = Transponders.from_cells(cells, moving, sent_ns)
         sent = self._states_when_sent(cells, moving, number, sent_ns)
-        velocity = self._broadcasts.velocity(equipage, Transponders.from_cells(cells, moving), sent)
+        velocity = self._broadcasts.velocity(equipage, senders, sent)
         for axis, values in zip(("north", "east", "climb"), velocity, strict=True):
             extras[f"reported_{axis}_m_s"][moving] = values
         extras["velocity_s"][moving] = sent_ns / NANOSECONDS
-        extras["nacv"][moving] = equipage.nacv[craft[moving]]
+        above_m = self._broadcasts.height_difference_m(equipage, senders, sent)
+        extras["reported_height_m"][moving] = extras["reported_alt_m"][moving] + above_m
+        extras["nacv"][moving] = equipage.nacv[senders.craft]
 
     def _states_when_sent(
         self, cells: Cells, which: IntArray, number: IntArray, sent_ns: IntArray
@@ -329,7 +347,8 @@ class AdsB(CooperativeSensor):
 
         Before a flight begins its aircraft flew on towards there as it is when the message is sent.
         """
-        latency_s = cells.roster.equipage.latency_s[cells.craft[which]]
+        roster = cells.roster
+        latency_s = roster.equipage.latency_s[roster.equipped(cells.craft[which], sent_ns)]
         instant_ns = sent_ns - np.rint(latency_s * NANOSECONDS).astype(np.int64)
         ahead_s = (instant_ns - cells.state_ns[which]) / NANOSECONDS
         back_s = np.zeros(len(which))
@@ -345,7 +364,8 @@ class AdsB(CooperativeSensor):
             position = [np.where(back_s > 0.0, b, p) for b, p in zip(before, position, strict=True)]
         velocity[2] = -velocity[2]
         lat, lon, height = position
-        return Sent(lat, lon, self.altimeter_m(height), velocity, number, instant_ns)
+        altitude = self.altimeter_m(height)
+        return Sent(lat, lon, altitude, height, velocity, number, instant_ns)
 
     def _measure(
         self,
@@ -365,7 +385,10 @@ class AdsB(CooperativeSensor):
         now_s = cells.state_ns[detected] / NANOSECONDS
         age_s = now_s - said["reported_s"]
         lat, lon, altitude = (said[f"reported_{name}"] for name in POSITION_FIELDS)
-        position = [lat, lon, self.heights_m(cells, detected, altitude)]
+        height = said["reported_height_m"]
+        if not self._is_geometric:
+            height = self.heights_m(cells, detected, altitude)
+        position = [lat, lon, height]
         velocity = rotate_velocity_to_later(
             position, velocity, said["reported_s"] - said["velocity_s"]
         )
@@ -375,10 +398,12 @@ class AdsB(CooperativeSensor):
         ahead = relative_ned(own, *displaced_position(*position, *(carried * (age_s + STEP_S))))
         moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / STEP_S)
         azimuth, elevation, distance = ned_to_body_angles(own, ned)
+        sent_ns = np.rint(said["reported_s"] * NANOSECONDS).astype(np.int64)
+        roster = cells.roster
         stated = StatedByAircraft(
-            cells.roster.equipage, cells.craft[detected], said,
+            roster.equipage, roster.equipped(cells.craft[detected], sent_ns), said,
             errs=self.p.position_errors != "none", rounds=self.p.compact,
-            pressure_deviation_m=self.p.pressure_deviation_m,
+            pressure_deviation_m=self.p.pressure_deviation_m, is_geometric=self._is_geometric,
         )  # fmt: skip
         late_m = stated.late_s * np.nan_to_num(moving)
         variances = variances_in_body(own, ned, stated.position_m2(age_s), late_m)

@@ -20,6 +20,7 @@ from components.surveillance.compact_position import decode_near, encode
 from components.surveillance.extended_squitter import (
     quantised_altitude_ft,
     quantised_climb_ft_min,
+    quantised_difference_ft,
     quantised_velocity_kt,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -36,17 +37,22 @@ _OWNER = "[equipage]"
 
 @dataclass(frozen=True)
 class Transponders:
-    """Of some aircraft, (n,): draw keys, runs and indices among the roster's aircraft."""
+    """Of some aircraft, (n,): draw keys, runs and indices in the roster's equipage."""
 
     keys: npt.NDArray[np.uint64]
     run: IntArray
     craft: IntArray
 
     @classmethod
-    def from_cells(cls, cells: Cells, which: IntArray) -> Transponders:
-        """Return those of some cells' targets."""
+    def from_cells(
+        cls, cells: Cells, which: IntArray, instant_ns: IntArray | None = None
+    ) -> Transponders:
+        """Return those of some cells' targets, by default as they are at the look."""
         keys = cells.roster.keys_of(cells.target[which])
-        return cls(keys, cells.run[which], cells.craft[which])
+        craft = cells.equipped[which]
+        if instant_ns is not None:
+            craft = cells.roster.equipped(cells.craft[which], instant_ns)
+        return cls(keys, cells.run[which], craft)
 
 
 class Altimeters:
@@ -79,11 +85,15 @@ class Altimeters:
 
 @dataclass(frozen=True)
 class Sent:
-    """True states at the instants that messages are of, (n,): position, and velocity (3, n)."""
+    """True states at the instants that messages are of, (n,): position, and velocity (3, n).
+
+    The altitude is what altimeters read there.
+    """
 
     lat_deg: FloatArray
     lon_deg: FloatArray
     alt_m: FloatArray
+    height_m: FloatArray
     north_east_up_m_s: FloatArray
     message: IntArray
     instant_ns: IntArray
@@ -99,7 +109,8 @@ class Broadcasts:
     def __init__(self, streams: Streams, errors: str, quantised: bool) -> None:
         self._errors, self._quantised = errors, quantised
         self._altimeters = Altimeters(streams)
-        self._streams = {name: streams.stream(_OWNER, name) for name in ("position", "velocity")}
+        names = "position", "velocity", "height"
+        self._streams = {name: streams.stream(_OWNER, name) for name in names}
         self._climbs = streams.stream(_OWNER, "climb")
         self._lasting = {
             name: GaussMarkov(stream, CORRELATION_TIME_S) for name, stream in self._streams.items()
@@ -139,6 +150,27 @@ class Broadcasts:
             return np.zeros(len(message))
         uniform = self._climbs.of_runs(transponders.run).uniform(transponders.keys, message)
         return CLIMB_SCALE_M_S * standard_laplace(uniform)
+
+    def height_difference_m(
+        self, equipage: Equipage, transponders: Transponders, sent: Sent
+    ) -> FloatArray:
+        """Return by how much geometric heights are said to be above pressure altitudes, (n,), m.
+
+        NaN of who sends no geometric height, and where the code does not reach.
+        """
+        messages = transponders, sent.message, sent.instant_ns
+        deviation = equipage.height_deviation_m[transponders.craft]
+        if np.isnan(deviation).all():
+            return deviation
+        # Along one of the axes that errors last in; at the equator it is north.
+        error, _ = self.level_errors("height", deviation, *messages)
+        error = np.where(np.isnan(deviation), np.nan, error)
+        errs = self._errors != "none"
+        altitude = self._altimeters.reported_ft(transponders, sent.alt_m, 0.0, errs)
+        difference = (sent.height_m + error) / FOOT_M - altitude
+        if self._quantised:
+            difference = quantised_difference_ft(difference)
+        return np.asarray(difference * FOOT_M)
 
     def velocity(self, equipage: Equipage, transponders: Transponders, sent: Sent) -> FloatArray:
         """Return velocities north, east and up as decoded, (3, n), m/s."""

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.known_targets import known_targets
-from components.atmosphere.pressure_altitude import pressure_altitude_m, scene_air
+from components.atmosphere.pressure_altitude import Air, scene_air
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.reach import Reach
 from components.sensor.look import Cells
@@ -28,8 +28,8 @@ STEP_S = 1.0 / 64.0
 
 #: What one who is heard lacks where no code has its altitude.
 NO_CODE = (
-    "those that it hears send no altitude (no code has one below -1,200 ft or above 126,700 ft), "
-    "and are not placed"
+    "those that it hears send no altitude that it takes (no code has one below -1,200 ft or above "
+    "126,700 ft), and are not placed"
 )
 
 #: Keys of sensors that measure lines of sight; a report that an aircraft makes has none of them.
@@ -39,6 +39,10 @@ _MEASURED_KEYS = (
     "azimuth_resolution_deg", "elevation_resolution_deg", "mount_azimuth_deg",
     "mount_elevation_deg", "mount_roll_deg", "misalignment_deg", "quantised", "biases",
 )  # fmt: skip
+
+
+def _as_read(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
 
 
 class CooperativeParameters(SensorParameters):
@@ -73,7 +77,7 @@ class CooperativeParameters(SensorParameters):
                 f"{key} is given: a cooperative sensor has no axes and no grid of its own; "
                 "leave it out"
                 for key in _MEASURED_KEYS
-                if key in given and given[key] != fields[key].default
+                if key in given and _as_read(given[key]) != fields[key].default
             ]
         )
         return given
@@ -101,19 +105,18 @@ class CooperativeSensor(Sensor):
         return replace(reach, lasts_s=4.0 * STEP_S) if self.p.enabled else reach
 
     @cached_property
-    def _air(self) -> dict[str, float]:
+    def _air(self) -> Air | None:
         """The atmosphere, where it is not the standard's."""
-        return scene_air(self.context.sections.get("weather"))
+        return scene_air(self.context.sections)
 
     def altimeter_m(self, height_m: FloatArray) -> FloatArray:
         """Return what altimeters read at heights, but for their errors, m."""
-        if not self._air:
+        if self._air is None:
             return height_m
-        altitude: FloatArray = pressure_altitude_m(height_m, **self._air)
-        return altitude
+        return np.asarray(self._air.pressure_altitude_m(height_m))
 
     def heights_m(self, cells: Cells, which: AnyArray, altitude_m: FloatArray) -> FloatArray:
-        """Return which heights reported pressure altitudes of some cells are taken for."""
+        """Return the heights that reported pressure altitudes of some cells are interpreted as."""
         if self.p.heights == "reported":
             return altitude_m
         own_m = self.altimeter_m(cells.of_row("own_alt_m")[which])
@@ -121,15 +124,20 @@ class CooperativeSensor(Sensor):
 
     def _note_pressure_heights(self) -> list[str]:
         """Say by how much pressure altitudes are off where they are taken for heights."""
-        if not self._air or self.p.heights != "reported":
+        if self._air is None or self.p.heights == "geometric":
             return []
-        low_m, high_m = self.altimeter_m(np.array([0.0, 3000.0])) - np.array([0.0, 3000.0])
-        stated = self.p.pressure_deviation_m
-        said = f"stated with a deviation of {stated:g} m" if stated else "nobody is told"
+        at_m = np.array([0.0, 1000.0, 1300.0, 3000.0])
+        low_m, here_m, above_m, high_m = self.altimeter_m(at_m) - at_m
+        stated, left_m = self.p.pressure_deviation_m, above_m - here_m
+        told = f"stated with a deviation of {stated:g} m" if stated else "nobody is told"
+        if self.p.heights == "by_own_altimeter":
+            said = f"300 m above the ownship {left_m:+.0f} m are left, and {told}"
+            return [f"heights is 'by_own_altimeter': {said}"] if abs(left_m) > 5.0 else []
         return [
-            f"heights is 'reported': pressure altitudes, off by {low_m:+.0f} m at sea level and "
-            f"{high_m:+.0f} m at 3,000 m ([weather] qnh_hpa, temperature_offset_c), are compared "
-            f"with heights as if they were such, and {said}; 'by_own_altimeter' takes that off"
+            f"heights is 'reported': pressure altitudes, off by {low_m:+.0f} m at 0 m and "
+            f"{high_m:+.0f} m at 3,000 m in the air of [weather] (qnh_hpa, temperature_offset_c), "
+            f"are compared with heights as if they were such, and {told}; 'by_own_altimeter' takes "
+            "that off"
         ]
 
     def warnings(self) -> list[str]:
@@ -159,7 +167,7 @@ class CooperativeSensor(Sensor):
                 raise ValueError(f"leaves_out: there is no {name!r}{did_you_mean(name, names)}")
 
     def of_others(self, cells: Cells, heard: BoolArray, address: IntArray) -> BoolArray:
-        """Return which cells are heard that have no address of an aircraft that is left out."""
+        """Return which received cells are not of an aircraft that is left out by its address."""
         roster = cells.roster
         for name in self.p.leaves_out:
             craft = np.full(len(cells), roster.names.index(name))
@@ -168,7 +176,7 @@ class CooperativeSensor(Sensor):
         return heard
 
     def has_position(self, cells: Cells, heard: IntArray, altitude_m: FloatArray) -> BoolArray:
-        """Return which of the cells that were heard are placed: one without an altitude is not.
+        """Return which received cells have a position: one without an altitude has none.
 
         An altitude that no code has is not available (NaN).
         """

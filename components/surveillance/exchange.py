@@ -67,7 +67,7 @@ class PositionExchange(Component):
         return {what: self._still}
 
     def warnings(self) -> list[str]:
-        """Say that there is nobody to hear."""
+        """Warn that no other aircraft exchanges positions."""
         rosters = known_targets(self.context)
         alone = rosters and not any(map(len, rosters))
         return ["nobody else flies: it hears of nobody"] if alone else []

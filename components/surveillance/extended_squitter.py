@@ -68,6 +68,15 @@ def quantised_altitude_ft(altitude_ft: npt.ArrayLike, step_ft: npt.ArrayLike = 2
     return np.asarray(np.where(coded, grid, np.nan))
 
 
+def quantised_difference_ft(difference_ft: FloatArray) -> FloatArray:
+    """Return by how much geometric heights are above pressure altitudes, in steps of 25 ft.
+
+    NaN where the code holds no such difference, above 3,137.5 ft either way.
+    """
+    steps = np.floor(difference_ft / ALTITUDE_STEP_FT + 0.5)
+    return np.where(np.abs(steps) <= 125, steps * ALTITUDE_STEP_FT, np.nan)
+
+
 def altitude_step_ft(altitude_ft: FloatArray, step_ft: npt.ArrayLike) -> FloatArray:
     """Return the step that altitudes are reported in: 100 ft where no code of 25 ft has them."""
     half = 0.5 * ALTITUDE_STEP_FT

@@ -15,6 +15,7 @@ REPORTED = {
     "reported_lat_deg": Column("deg", WGS84, "latitude as decoded, at reported_s"),
     "reported_lon_deg": Column("deg", WGS84, "longitude as decoded, at reported_s"),
     "reported_alt_m": Column("m", "pressure altitude", "altitude as reported, in 25 or 100 ft"),
+    "reported_height_m": Column("m", WGS84, "height above the ellipsoid as reported, if it is"),
     "reported_north_m_s": Column("m/s", OWN_NED, "velocity over ground as decoded, north"),
     "reported_east_m_s": Column("m/s", OWN_NED, "the same, east"),
     "reported_climb_m_s": Column("m/s", OWN_NED, "vertical rate, upward"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,14 +41,14 @@ _UNKNOWN_M_S, _MANOEUVRE_M_S2 = 100.0, 1.0
 _LEAST_M2 = 1e-4
 
 
-def lasting_errors(position_errors: str) -> dict[str, LastingError]:
+def lasting_errors(position_errors: str, is_geometric: bool = False) -> dict[str, LastingError]:
     """Return what lasts of what aircraft say: all but rounding, which is taken to last too."""
     if position_errors == "none":
         return {}
-    lasts_s = {"elevation": math.inf}  # an aircraft keeps its altimeter
+    lasts_s = {} if is_geometric else {"elevation": math.inf}  # an aircraft keeps its altimeter
     if position_errors == "gauss_markov":
-        for name in ("azimuth", "range", "range_rate"):
-            lasts_s[name] = CORRELATION_TIME_S
+        for name in ("azimuth", "elevation", "range", "range_rate"):
+            lasts_s.setdefault(name, CORRELATION_TIME_S)
     return {
         name: LastingError(parts=(LastingPart(lasts_s=time_s, share=1.0),))
         for name, time_s in lasts_s.items()
@@ -75,12 +75,13 @@ ERRORS_OF_REPLIES = (
 )
 
 
-def errors_of_broadcast(position_errors: str) -> tuple[ToldError, ...]:
+def errors_of_broadcast(position_errors: str, is_geometric: bool) -> tuple[ToldError, ...]:
     """Return the errors that broadcasts tell of; what is rounded stays in its step as long."""
     lasts_s = 0.0 if position_errors == "white" else CORRELATION_TIME_S
     ways = {"place_deviation": (NORTH, EAST), "speed_deviation": (SPEED_NORTH, SPEED_EAST)}
     level = [ToldError(way, told, lasts_s) for told, both in ways.items() for way in both]
-    return (*level, ALTIMETER, ROUNDING, VERTICAL_RATE)
+    height = replace(ALTIMETER, lasts_s=lasts_s) if is_geometric else ALTIMETER
+    return (*level, height, ROUNDING, VERTICAL_RATE)
 
 
 def empty_error_columns(count: int) -> dict[str, FloatArray]:
@@ -113,7 +114,7 @@ class StatedByAircraft:
     """What the categories of some aircraft, by index, state of what they reported.
 
     `errs` and `rounds` say whether what they send has errors, and is rounded; pressure altitudes
-    are off heights by so much beside.
+    are off heights by so much beside, unless it is their geometric heights that are taken.
     """
 
     equipage: Equipage
@@ -122,6 +123,7 @@ class StatedByAircraft:
     errs: bool
     rounds: bool
     pressure_deviation_m: float = 0.0
+    is_geometric: bool = False
 
     @property
     def speed_m2_s2(self) -> FloatArray:
@@ -142,6 +144,8 @@ class StatedByAircraft:
     def _height_rounding_m2(self) -> FloatArray:
         step = altitude_step_ft(self.said["reported_alt_m"] / FOOT_M, ALTITUDE_STEP_FT)
         rounding: FloatArray = self.rounds * (step * FOOT_M) ** 2 / 12.0
+        if self.is_geometric and self.rounds:  # and its difference from the altitude is
+            rounding = rounding + (ALTITUDE_STEP_FT * FOOT_M) ** 2 / 12.0
         return rounding
 
     @property
@@ -168,8 +172,11 @@ class StatedByAircraft:
         square = self.equipage.position_deviation_m[self.craft] ** 2
         level = np.where(self.errs, square, _LEAST_M2)
         feet = self.said["reported_alt_m"] / FOOT_M
-        high = np.where(self.errs, altimetry_variance_ft2(feet) * FOOT_M**2, _LEAST_M2)
-        if self.pressure_deviation_m:
+        altimetry = altimetry_variance_ft2(feet) * FOOT_M**2
+        if self.is_geometric:
+            altimetry = self.equipage.height_deviation_m[self.craft] ** 2
+        high = np.where(self.errs, altimetry, _LEAST_M2)
+        if self.pressure_deviation_m and not self.is_geometric:
             high = high + self.pressure_deviation_m**2
         if self.rounds:
             level = level + _COMPACT_M2

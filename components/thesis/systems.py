@@ -44,7 +44,7 @@ class Errors:
     elevation_deg: FloatArray
     east_m: FloatArray
 
-    def by_range(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def statistics_by_range(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return middle of each bin of 1 km, mean and standard deviation there."""
         index = np.digitize(self.range_km, _EDGES_KM) - 1
         bins = [number for number in range(len(_EDGES_KM) - 1) if np.sum(index == number) > 1]
@@ -92,10 +92,10 @@ def _tecvol(printed: Cells) -> tuple[list[Row], Picture, Columns]:
             ):
                 for quantity, style in (("azimuth", "o-"), ("elevation", "s--")):
                     values = getattr(errors[name], f"{quantity}_deg")
-                    middle, mean, spread = errors[name].by_range(values)
+                    middle, mean, spread = errors[name].statistics_by_range(values)
                     angles.plot(middle, np.hypot(mean, spread), style, color=colour, markersize=4,
                                 label=f"{label}, {quantity}")  # fmt: skip
-            middle, mean, spread = radar.by_range(radar.east_m)
+            middle, mean, spread = radar.statistics_by_range(radar.east_m)
             plan.errorbar(middle, mean, spread, fmt="o-", color=RADAR, markersize=4,
                             label="radar: mean ± standard deviation")  # fmt: skip
             angles.set_ylabel("root mean square angle error (deg)")
@@ -112,7 +112,7 @@ def _tecvol(printed: Cells) -> tuple[list[Row], Picture, Columns]:
     data |= {f"{kind}_{part}_deg": [] for kind in kinds for part in ("mean", "std")}
     for name, result in errors.items():
         for kind in kinds:
-            middle, mean, spread = result.by_range(getattr(result, f"{kind}_deg"))
+            middle, mean, spread = result.statistics_by_range(getattr(result, f"{kind}_deg"))
             data[f"{kind}_mean_deg"] += mean.tolist()
             data[f"{kind}_std_deg"] += spread.tolist()
         data["sensor"] += [name] * len(middle)

@@ -36,7 +36,7 @@ from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import Tries, has_two
+from dsa_des.record.undone import Tries, has_two_bits
 
 # Fused tracks by number: as many as are compared.
 _TRACKS = 64
@@ -164,7 +164,7 @@ class CovarianceIntersection(Component):
         self._tries = Tries()
 
     def undone(self) -> dict[str, IntArray]:
-        """Return in which runs it never put tracks of two trackers together."""
+        """Return the runs in which it never fused tracks of two trackers."""
         return self._tries.undone(
             "two trackers or more have tracks, and it never puts two of them together", of_two=True
         )
@@ -308,7 +308,9 @@ class CovarianceIntersection(Component):
             leader, of = leaders(mine)
             trackers = np.zeros(len(leader), dtype=np.int64)
             np.bitwise_or.at(trackers, of, np.int64(1) << mine.tracker)
-            self._tries = self._tries.add_tries(mine.replica[leader], trackers, has_two(trackers))
+            self._tries = self._tries.add_tries(
+                mine.replica[leader], trackers, has_two_bits(trackers)
+            )
         before = reported.rows_of_runs(replica)
         when = records.time_s[np.searchsorted(records.replica, mine.replica)]
         fused = fuse_states(mine, when, self._rules.motion, self.p.rule)

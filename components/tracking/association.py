@@ -92,7 +92,7 @@ class Candidates:
         )
 
     @cached_property
-    def price(self) -> FloatArray:
+    def cost_of_none(self) -> FloatArray:
         """Of each pair, what it costs its track to go without: the widest gate that it has."""
         sizes = np.concatenate([np.full(len(one.track), one.kind.size) for one in self.kinds])
         limits = np.zeros(8)
@@ -177,7 +177,7 @@ class GlobalNearest(OneToOne):
     def taken(self, pairs: Candidates) -> IntArray:
         """Return the pairs that are taken."""
         cost = pairs.distance + pairs.volume
-        return global_nearest(pairs.track, pairs.detection, cost, pairs.price)
+        return global_nearest(pairs.track, pairs.detection, cost, pairs.cost_of_none)
 
 
 class JointProbabilistic(Association):

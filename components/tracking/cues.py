@@ -100,13 +100,13 @@ class Cues(Component):
         if tracks is None:
             return None
         row, entry, half_rad = self._cueing_tracks(tracks)
-        rows = self._due(wake, np.bincount(row, minlength=len(tracks)) > 0)
+        rows = self._due_rows(wake, np.bincount(row, minlength=len(tracks)) > 0)
         if not len(rows):
             return None
         due = np.isin(row, rows)
         return self._message(wake, tracks, rows, row[due], entry[due], half_rad[due])
 
-    def _due(self, wake: Wake, some: BoolArray) -> IntArray:
+    def _due_rows(self, wake: Wake, some: BoolArray) -> IntArray:
         """Return the rows at which cues are sent, given at which of them there are some."""
         run, tick = wake.run, wake.ticks
         more = max(int(run[-1]) + 1 - len(self._silent), 0)

@@ -13,7 +13,7 @@ from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected_measurement
 from components.geometry import wrap_pi_unchecked
 from components.messages.state_tracks import COASTED, CONFIRMED
-from components.tracking.reported_errors import by_angles, level_angles
+from components.tracking.reported_errors import level_angles, variances_by_angles
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import TELLS, LookBatch, Scans, kind_of
 from components.tracking.track_store import TrackStore
@@ -116,8 +116,8 @@ def gate_pairs(
                     )
                 ]  # fmt: skip
                 pairs = pair_measurement(
-                    foreseen, np.arange(len(track)), measured, by_angles(white, measured), None,
-                    part.weights,
+                    foreseen, np.arange(len(track)), measured,
+                    variances_by_angles(white, measured), None, part.weights,
                 )  # fmt: skip
             else:
                 variance = spread(track, cells, rows)
@@ -292,7 +292,7 @@ def common_errors(
     if rules.lasting is None:
         return None
     source = scans.source[rows].take(cells, axis=1)
-    if not rules.lasting.lasts[source].any():
+    if not rules.lasting.is_correlated[source].any():
         return None
     there = np.maximum(source, 0)
     when = part.seen_tick[there, track]

@@ -3,7 +3,7 @@
 Two rules confirm: m hits among the last n expected looks, or the sequential likelihood ratio of
 Wald, applied to tracks by Sittler (IEEE Trans. Military Electronics 8, 1964): the logarithm of the
 odds that there is something rises with every hit by ln(Pd N(z) / λ) and falls with every
-misdetection by ln(1 - Pd Pg). Which looks count, `components.tracking.promises` says.
+misdetection by ln(1 - Pd Pg). Which looks count, `components.tracking.due_detections` says.
 """
 
 from typing import Any
@@ -21,7 +21,7 @@ from components.estimation.frame import SensorPose
 from components.estimation.kalman import innovation, update
 from components.estimation.measurement import Kind, expected_measurement, linearise, position_of
 from components.messages.state_tracks import COASTED, CONFIRMED, DELETED, TENTATIVE
-from components.tracking.promises import misdetection_counts, range_of
+from components.tracking.due_detections import misdetection_counts, range_of
 from components.tracking.rules import LONGEST_WINDOW, TrackerRules
 from components.tracking.scans import TELLS, LookBatch, Scans, kind_of
 from components.tracking.track_store import NEVER, TrackStore, estimate_columns

@@ -207,13 +207,13 @@ def late_look_shares(
         if not ahead_s:
             continue
         looks = [t for k in range(_MOST_LOOKS) if (t := _instant(clock, k)) < duration_s]
-        late = sum(any(_overtaken(t, one, by_s, lag_s) for one, by_s in ahead_s) for t in looks)
+        late = sum(any(_is_overtaken(t, one, by_s, lag_s) for one, by_s in ahead_s) for t in looks)
         if late:
             shares[name] = late / len(looks)
     return shares
 
 
-def _overtaken(t: Fraction, clock: ClockSpec, by_s: Fraction, lag_s: Fraction) -> bool:
+def _is_overtaken(t: Fraction, clock: ClockSpec, by_s: Fraction, lag_s: Fraction) -> bool:
     """Return whether a clock has an instant between ``t + lag_s`` and ``t + by_s``."""
     after = (t + lag_s - clock.offset_s) // clock.period_s + 1
     return _instant(clock, max(int(after), 0)) < t + by_s

@@ -120,7 +120,7 @@ class CarriedErrors:
         return Ages(position, velocity, since_s, late)
 
 
-def by_angles(variance_m2: FloatArray, measured: FloatArray) -> FloatArray:
+def variances_by_angles(variance_m2: FloatArray, measured: FloatArray) -> FloatArray:
     """Return variances along three axes, m², as those of azimuth, elevation and range."""
     result, distance = variance_m2.copy(), np.maximum(measured[2], 1.0)
     level = np.maximum(np.cos(measured[1]), _LEAST_COS)

@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 from components.estimation.estimator import Estimator
 from components.messages.detections import SensorOffer
 from components.messages.reach import Reach
-from components.tracking.promises import LIVES_S, Promises
+from components.tracking.due_detections import LIVES_S, Promises
 from components.tracking.reported_errors import CarriedErrors
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
@@ -62,15 +62,17 @@ class LastingErrors:
         return cls(step, variance, lasts_s, across_m2, share)
 
     @cached_property
-    def lasts(self) -> BoolArray:
-        """Whether any error of each sensor is correlated; last False, for no sensor (-1)."""
+    def is_correlated(self) -> BoolArray:
+        """Whether any error of each sensor is correlated; the last one, of no sensor (-1), is
+        False.
+        """
         parts = (self.variance != 0.0) | (self.across_m2 != 0.0) | (self.share != 0.0)
         return np.append((self.step != 0.0).any(axis=0) | parts.any(axis=(0, 1)), False)
 
     @cached_property
     def sensors(self) -> int:
         """Mask of the sensors any of whose errors is correlated."""
-        return sum(1 << i for i in np.flatnonzero(self.lasts).tolist())
+        return sum(1 << i for i in np.flatnonzero(self.is_correlated).tolist())
 
     @cached_property
     def _is_across_angles(self) -> bool:
@@ -239,7 +241,7 @@ class TrackerParameters(Parameters):
     )
 
     @model_validator(mode="after")
-    def _possible(self) -> Any:
+    def _check_confirmation(self) -> Any:
         if self.confirm_m > self.confirm_n:
             raise ValueError(
                 f"confirm_m = {self.confirm_m} hits cannot fall in confirm_n = {self.confirm_n} "

@@ -14,9 +14,9 @@ from components.estimation.out_of_sequence import (
 )
 from components.messages.state_tracks import DELETED
 from components.tracking.association import Association, Candidates
+from components.tracking.due_detections import expected_looks
 from components.tracking.gating import gate_pairs
 from components.tracking.management import initiate_tracks, manage_tracks, position_variance
-from components.tracking.promises import expected_looks
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import LookBatch
 from components.tracking.track_store import TrackStore

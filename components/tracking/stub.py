@@ -16,6 +16,7 @@ from components.sensor.marks import TRACKER
 from components.tracking.reported_errors import folded_ranges, unknown_latency
 from dsa_des.arrays.entries import cells_of
 from dsa_des.arrays.keyed_table import KeyedTable
+from dsa_des.arrays.run_ticks import take_runs
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.message import Message, offsets_of
@@ -107,7 +108,7 @@ class TrackerStub(Component):
         replica = wake.run.take(updated)
         begins = np.concatenate(([True], replica[1:] != replica[:-1]))
         before = self._held.rows_of_runs(replica[begins])
-        targets, column = _present(before.target, fused.target, len(fused.roster))
+        targets, column = _held_and_new(before.target, fused.target, len(fused.roster))
         pool, held, new = _pool(before, fused, replica.take(rows))
         last = np.full((len(updated), len(targets)), -1, dtype=np.int64)
         if len(held):
@@ -138,7 +139,7 @@ class TrackerStub(Component):
         if fused is None:
             return None, counts
         if busy is not None and len(fused.target):
-            run = busy.run[fused.row_of_entries]
+            run = take_runs(busy.run, fused.row_of_entries)
             self._tries = self._tries.add_tries(run, np.ones_like(run), fused.target >= 0)
         fused = true_entries(fused)
         if self.p.drop_after_s is not None:
@@ -229,7 +230,7 @@ def _pool(
     return {name: v[order] for name, v in pool.items()}, index[:start], index[start:]
 
 
-def _present(held: IntArray, new: IntArray, targets: int) -> tuple[IntArray, IntArray]:
+def _held_and_new(held: IntArray, new: IntArray, targets: int) -> tuple[IntArray, IntArray]:
     """Return the targets that are held or newly measured, ascending, and each one's column."""
     there = np.zeros(targets, dtype=bool)
     there[held] = True

@@ -179,7 +179,7 @@ _UNSHOWN = {
 }  # fmt: skip
 
 
-def _by_row(reported: Sequence[TrackStore]) -> TrackStore:
+def _store_by_row(reported: Sequence[TrackStore]) -> TrackStore:
     """Return what is shown of all tracks by row; component by component, which stays in caches."""
     parts = [part.columns for part in reported]
     row = np.concatenate([part["row"] for part in parts])
@@ -211,7 +211,7 @@ def state_tracks(
         empty.tick, empty.offsets = ticks, np.zeros(len(ticks) + 1, dtype=np.int64)
         empty.sensors = sensors
         return empty
-    tracks = _by_row(reported)
+    tracks = _store_by_row(reported)
     state, covariance = mixture_moments(tracks.estimates())
     own, origin = tracks.own, tracks.origin
     away = state[:3] - own

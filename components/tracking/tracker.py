@@ -15,6 +15,7 @@ from components.messages.fused import FusedDetections
 from components.messages.state_tracks import CONFIRMED, DELETED, StateTracks
 from components.sensor.marks import TRACKER
 from components.tracking.association import ASSOCIATIONS, Association
+from components.tracking.due_detections import ACTS_EVERY_S, Silence
 from components.tracking.ladder import LADDERS
 from components.tracking.out_of_sequence import (
     LookCount,
@@ -29,7 +30,6 @@ from components.tracking.out_of_sequence import (
     tracks_before,
     warning,
 )
-from components.tracking.promises import ACTS_EVERY_S, Silence
 from components.tracking.reported_errors import (
     coarse_bearings,
     errors_by_sensors,
@@ -211,7 +211,7 @@ class Tracker(Component):
             reported, worked = self._process_looks(busy, wake)
         silence = self._silence(wake, worked)
         if len(self._store) and len(silence):
-            spans = silence.from_last_work(self._records.replica, self._records.worked_tick)
+            spans = silence.silence_after_work(self._records.replica, self._records.worked_tick)
             self._store, more = silence.end_silent_tracks(self._store, self._records, *spans)
             reported += more
         rows = np.unique(np.concatenate([worked, *(part.row[:1] for part in reported)]))
@@ -270,7 +270,7 @@ class Tracker(Component):
         rows = np.unique(row)
         silence, first, last = self._silence(wake, rows), row, row - 1
         if len(silence):
-            first, last = silence.since_last_work(row, records.worked_tick[plan.of])
+            first, last = silence.silence_since_work(row, records.worked_tick[plan.of])
         records.worked_tick[plan.of] = wake.ticks[row]
         # Tracks as last shown, of runs in a row that brings several works: one may end in between.
         shown_last, begins = store.take(_NO_ROWS), plan.begins

@@ -4,6 +4,7 @@
 """
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,7 +16,6 @@ from components.formats.recorded.traffic_of_files import TrafficChoice, read_tra
 from components.formats.sample_columns import Altitude
 from components.formats.text_rows import TrafficFile
 from components.traffic.recorded import (
-    FileHeights,
     FileParameters,
     RecordedTraffic,
     RecordedTrafficParameters,
@@ -68,7 +68,7 @@ class Place(Parameters):
     alt_m: float = Field(default=0.0, description="Altitude, m.")
 
 
-class FileTrafficParameters(RecordedTrafficParameters, FileHeights):
+class FileTrafficParameters(RecordedTrafficParameters):
     """Parameters of recorded traffic of any kind."""
 
     file: ScenePath | list[ScenePath] = Field(
@@ -189,13 +189,16 @@ class FileTraffic(RecordedTraffic):
         self._let_ownship_be(parameters.own_flight)
 
     def read(self) -> TrafficFile:
-        """Return what is taken of the files."""
-        return traffic_of(self.p)
+        """Return what is taken of the files, heights above sea level put above the ellipsoid."""
+        air = self.air if self.p.heights == "geometric" else None
+        return traffic_of(self.p, 0.0 if air is None else air.geoid_m)
 
     def own_flight(self) -> Trajectory:
         """Return the ownship's flight, recorded or scripted."""
-        own = self.p.own_flight
-        return self.content.ownship if own is None else flight_of(own, own.start, self.wind)
+        if (given := self.p.own_flight) is None:
+            return self.content.ownship
+        own = given.in_air(self.air)
+        return flight_of(own, own.start, self.wind)
 
     def file_names(self) -> str:
         """Return the names of the files, for messages."""
@@ -203,7 +206,7 @@ class FileTraffic(RecordedTraffic):
         return f"{first} and {len(others)} more" if others else str(first)
 
 
-class DaaFileParameters(FileParameters, FileHeights):
+class DaaFileParameters(FileParameters):
     """Parameters of a DAIDALUS traffic file."""
 
     reference_lat_deg: float = Field(
@@ -225,9 +228,10 @@ class DaaFile(RecordedTraffic):
         return _read_daa(p.file, p.reference_lat_deg, p.reference_lon_deg, p.reference_alt_m)
 
 
-def traffic_of(parameters: FileTrafficParameters) -> TrafficFile:
-    """Return what is taken of files."""
-    content: TrafficFile = _read(parameters.paths(), parameters.choice())
+def traffic_of(parameters: FileTrafficParameters, geoid_m: float = 0.0) -> TrafficFile:
+    """Return what is taken of files, where sea level lies so high above the ellipsoid."""
+    choice = replace(parameters.choice(), geoid_m=geoid_m)
+    content: TrafficFile = _read(parameters.paths(), choice)
     return content
 
 

@@ -64,7 +64,7 @@ class RandomTraffic(TrafficSource):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         p = parameters
-        own = p.ownship
+        own = p.ownship.in_air(self.air)
         self.own = flight_of(own, own.start, self.wind)
         names = tuple(f"intruder_{number}" for number in range(1, p.intruders + 1))
         keys = target_keys(names)

@@ -4,29 +4,25 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from components.aircraft.aircraft import OWNSHIP, Aircraft, Roster
 from components.aircraft.equipage import EquipageShares, with_shares
-from components.atmosphere.pressure_altitude import (
-    height_of_pressure_altitude_m,
-    pressure_altitude_m,
-    scene_air,
-)
-from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG, scene_wind
+from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG
 from components.flights.closest_approach import KnownTimes, SampleTimes
 from components.flights.fleet import Trajectory
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.formats.text_rows import TrafficFile
 from components.geometry import line_of_sight_ned
+from components.traffic.heights import Heights
 from components.traffic.scripted import Ownship
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.arrays.types import FloatArray
-from dsa_des.block.component import Parameters, ScenePath
+from dsa_des.block.component import ScenePath
 from dsa_des.errors import did_you_mean
 
 #: Beyond any aircraft: m/s along the path and upward, m/s², and metres above the ellipsoid.
@@ -147,7 +143,7 @@ def derived_attitude(content: TrafficFile) -> dict[str, Any]:
     return names
 
 
-class RecordedTrafficParameters(SourceParameters):
+class RecordedTrafficParameters(SourceParameters, Heights):
     """Parameters of recorded traffic."""
 
     intruder: Aircraft = Field(
@@ -158,16 +154,6 @@ class RecordedTrafficParameters(SourceParameters):
     )
     equipage_shares: EquipageShares = Field(
         default=EquipageShares(), description="Shares of intruders that carry their equipage."
-    )
-
-
-class FileHeights(Parameters):
-    """What altitudes of a file are."""
-
-    heights: Literal["geometric", "pressure"] = Field(
-        default="geometric",
-        description="What the file's altitudes are flown as: heights, or pressure altitudes, which "
-        "are put at the heights where the air of `[weather]` has these pressures.",
     )
 
 
@@ -219,30 +205,23 @@ class RecordedTraffic(TrafficSource):
     def _in_air(self, content: TrafficFile) -> TrafficFile:
         """Return the flights as they are in the scene's air.
 
-        Noses are turned into its wind, and pressure altitudes are put at their heights.
+        Noses are turned into its wind, and altitudes that are no heights are put at theirs.
         """
-        weather = self.context.sections.get("weather")
-        wind, air = scene_wind(weather), scene_air(weather)
-        at_pressures = bool(air) and getattr(self.p, "heights", "") == "pressure"
-        if wind is None and not at_pressures:
+        wind, air = self.wind, self.air
+        if wind is None and (air is None or self.p.heights == "geometric"):
             return content
         blows = (0.0, 0.0) if wind is None else (wind.east_mps, wind.north_mps)
         own, *intruders = (
-            craft.in_air(
-                *blows,
-                height_of_pressure_altitude_m(craft.alt_m, **air) if at_pressures else None,
-            )
-            for craft in content.aircraft
+            craft.in_air(*blows, self.p.height_m(air, craft.alt_m)) for craft in content.aircraft
         )
         return replace(content, ownship=own, intruders=intruders)
 
     def _says_heights(self) -> list[str]:
         """Say that a file's altitudes are pressure altitudes, in air that is not the standard's."""
-        air = scene_air(self.context.sections.get("weather"))
         is_pressure = re.search("baro|pressure", self.content.height, re.IGNORECASE)
-        if not air or not is_pressure or getattr(self.p, "heights", "") != "geometric":
+        if self.air is None or not is_pressure or self.p.heights != "geometric":
             return []
-        off_m = float(pressure_altitude_m(1000.0, **air)) - 1000.0
+        off_m = float(self.air.pressure_altitude_m(1000.0)) - 1000.0
         return [
             f"its altitudes ({self.content.height}) are pressure altitudes and are flown as "
             f"heights, off by {off_m:+.0f} m at 1,000 m in the air of [weather]; heights = "

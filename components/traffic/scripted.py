@@ -2,19 +2,21 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import OWNSHIP, Aircraft, Roster, joint_roster
+from components.atmosphere.pressure_altitude import Air
 from components.flights.attitude import Wind, ground_speed_mps
 from components.flights.closest_approach import RegularTimes, SampleTimes
-from components.flights.legs import AnyLeg, Position
+from components.flights.legs import AnyLeg, Position, Waypoints
 from components.flights.many_flights import straight_fleet
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry import enu_to_geodetic
 from components.traffic.flown_flights import FlightsOfRuns
+from components.traffic.heights import Heights
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
 from components.traffic.wires import NO_AREAS, OverheadWire
@@ -22,7 +24,7 @@ from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters
 
 
-class Flight(Parameters):
+class Flight(Heights):
     """How an aircraft starts and flies; without legs it flies straight on for ever."""
 
     alt_m: float | None = Field(default=None, description="Altitude at the start, m.")
@@ -64,6 +66,23 @@ class Flight(Parameters):
                 "one of them may be given"
             )
         return self
+
+    def in_air(self, air: Air | None) -> Self:
+        """Return it with heights above the ellipsoid in place of altitudes, in a scene's air."""
+        if air is None or self.heights == "geometric":
+            return self
+
+        def lifted(one: Any, key: str) -> Any:
+            if getattr(one, key, None) is None:
+                return one
+            return one.model_copy(update={key: float(self.height_m(air, getattr(one, key)))})
+
+        legs = [
+            leg.model_copy(update={"points": [lifted(point, "alt_m") for point in leg.points]})
+            if isinstance(leg, Waypoints) else lifted(leg, "to_alt_m")
+            for leg in self.legs
+        ]  # fmt: skip
+        return cast(Self, lifted(self.model_copy(update={"legs": legs}), "alt_m"))
 
 
 class Ownship(Flight, Aircraft):
@@ -171,6 +190,13 @@ class ScriptedParameters(SourceParameters):
         description="Spacing of the samples at which closest approach is sought, s.",
     )
 
+    def in_air(self, air: Air | None) -> Self:
+        """Return them with heights in place of all altitudes of flights, in a scene's air."""
+        if air is None:
+            return self
+        flights = [one.in_air(air) for one in self.intruders]
+        return self.model_copy(update={"ownship": self.ownship.in_air(air), "intruders": flights})
+
     def targets(self, terrain: Any) -> list[Intruder]:
         """Return all that is there: intruders, the pieces of wires, and sites, which stand."""
         pieces = [Intruder(**piece) for wire in self.wires for piece in wire.pieces()]
@@ -187,6 +213,7 @@ class ScriptedTraffic(TrafficSource):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
+        parameters = parameters.in_air(self.air)
         own = parameters.ownship
         self.own = flight_of(own, own.start, self.wind)
         crafts = parameters.targets(self.context.sections.get("terrain"))
@@ -204,6 +231,7 @@ class ScriptedTraffic(TrafficSource):
         self, parameters: Sequence[Any], make: Callable[[int], Any]
     ) -> FlightsOfRuns | None:
         """Return the flights of runs; those that are all straight are prepared together."""
+        parameters = [p.in_air(self.air) for p in parameters]
         own = [p.ownship for p in parameters]
         terrain = self.context.sections.get("terrain")
         crafts = [craft for p in parameters for craft in p.targets(terrain)]

@@ -13,6 +13,7 @@ from pydantic import Field
 
 from components.aircraft.aircraft import Aircraft, Roster, joint_roster
 from components.aircraft.known_targets import KnownTraffic
+from components.atmosphere.pressure_altitude import Air, scene_air
 from components.flights.attitude import Wind, scene_wind
 from components.flights.bounds import (
     FlightAt,
@@ -51,7 +52,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
-from dsa_des.time.clock import ClockSpec
+from dsa_des.time.clock import NANOSECONDS, ClockSpec
 
 
 class SourceParameters(Parameters):
@@ -89,6 +90,7 @@ class TrafficSource(Component):
     windowed = True
     rewindable = True
     clocked = "demand"
+    heeds_changes = True
     hooks = (ATTITUDE,)
 
     own: Trajectory
@@ -107,6 +109,11 @@ class TrafficSource(Component):
     def wind(self) -> Wind | None:
         """The scene's wind, or None."""
         return scene_wind(self.context.sections.get("weather"))
+
+    @property
+    def air(self) -> Air | None:
+        """The scene's air, or None for the standard's."""
+        return scene_air(self.context.sections)
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
@@ -153,6 +160,11 @@ class TrafficSource(Component):
             # In wind a nose may point anywhere.
             return replace(envelope, pitch_rad=0.5 * math.pi, roll_rad=math.pi)
         return envelope
+
+    def heed_change(self, from_s: Fraction, other: Any) -> None:
+        """Carry from an instant on what another instance does; all else of aircraft stays."""
+        later = (*self.roster.later, (round(from_s * NANOSECONDS), other.roster))
+        self.roster = replace(self.roster, later=later)
 
     def setup(self) -> None:
         """Learn who looks and is steered, and how far sensors look; what is beyond is not moved."""
@@ -213,7 +225,7 @@ class TrafficSource(Component):
         if terrain is not None and terrain.height_m is not None:
             check_above_terrain(own_at, terrain.height_m, end_s)
         if terrain is not None and terrain.raster is not None:
-            check_on_raster(own_at, terrain.raster.raster, terrain.raster_offset_m, end_s)
+            check_on_raster(own_at, terrain.raster.raster, terrain.raster_zero_m, end_s)
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
@@ -231,11 +243,12 @@ class TrafficSource(Component):
         # What [accuracy] leaves out may rest on what the targets are.
         accuracy = self.context.sections.get("accuracy")
         allows = accuracy is not None and accuracy.model_dump(exclude_none=True)
-        if flights is None or (allows and flights.roster is not self.roster):
+        fixed = allows or self.roster.later
+        if flights is None or (fixed and flights.roster is not self.roster):
             return None
         # A flight into the ground is said of its own replica, by itself.
         for number in range(len(parameters)):
-            self._check_terrain(partial(_one_of, flights.own, number))
+            self._check_terrain(partial(_states_of_one, flights.own, number))
         of_all = copy(self)
         flown = FlownFlights.of(flights.own, flights.targets, self._flown.platforms)
         of_all._fly(flown, flights.roster, parameters)
@@ -275,8 +288,8 @@ class TrafficSource(Component):
         flown = self._flown
         seen = Seen(self._views, flown, run, time_s)
         states = self._targets_at(run, seen.columns, time_s)
-        present, culled = seen.by_ownship(states.present)
-        others = seen.by_others(states.present, self.roster.names)
+        present, culled = seen.present_for_ownship(states.present)
+        others = seen.present_for_others(states.present, self.roster.names)
         truth = replace(flown, intervals={}, rates_hz=None, unseen=()) if self.says_truth else None
         asked = any(look.lasts_s > 0.0 for look in self._looks.values())
         return TrafficStates.of(
@@ -392,6 +405,6 @@ class TrafficSource(Component):
         return [*self.sample_times(), *grid]
 
 
-def _one_of(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
+def _states_of_one(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
     """Return the states of one flight of many at times (n,)."""
     return fleet.each(np.full(len(time_s), aircraft), time_s)

@@ -139,11 +139,11 @@ class Seen:
             viewers = np.array([view.viewer for view in views[1:]])
             self.columns = np.unique(np.concatenate([columns, viewers, *others]))
 
-    def by_ownship(self, there: BoolArray) -> tuple[BoolArray, IntArray | None]:
-        """Return which targets are present for the ownship, and how many are left out."""
-        return self._present(-1, there, self.own.present)
+    def present_for_ownship(self, there: BoolArray) -> tuple[BoolArray, IntArray | None]:
+        """Return which targets the ownship may see at each row, and how many are left out."""
+        return self._present_for(-1, there, self.own.present)
 
-    def by_others(
+    def present_for_others(
         self, there: BoolArray, names: Sequence[str]
     ) -> Mapping[str, tuple[BoolArray, IntArray | None]]:
         """Return the same for the other platforms, by name, with the ownship in their places."""
@@ -152,10 +152,10 @@ class Seen:
             place = int(np.searchsorted(self.columns, view.viewer))
             changed = there.copy()
             changed[:, place] = self.own.present
-            result[names[view.viewer]] = self._present(view.viewer, changed, there[:, place])
+            result[names[view.viewer]] = self._present_for(view.viewer, changed, there[:, place])
         return result
 
-    def _present(
+    def _present_for(
         self, viewer: int, there: BoolArray, looking: BoolArray
     ) -> tuple[BoolArray, IntArray | None]:
         _, columns, near = self._near[viewer]

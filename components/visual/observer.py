@@ -16,9 +16,15 @@ from components.atmosphere.visibility import KOSCHMIEDER
 from components.geometry import FieldOfView
 from components.messages.reach import Reach
 from components.optical.area_of_cells import area_of_cells
-from components.optical.weather_effects import DARKNESS, Night, scene_visibility_m
+from components.optical.weather_effects import (
+    DARKNESS,
+    TRANSMISSION,
+    CellsInTheWay,
+    Night,
+    scene_visibility_m,
+)
 from components.sensor.ladder_values import measure_cells
-from components.sensor.look import Cells, Look
+from components.sensor.look import Cells, Look, values_of
 from components.sensor.marks import EYES
 from components.sensor.parameters import (
     CorrelationTime,
@@ -28,7 +34,6 @@ from components.sensor.parameters import (
     rising_elevations,
 )
 from components.sensor.sensor import Sensor
-from components.sensor.weather_cells import cells_warnings
 from components.visual.acquisition import (
     UNALERTED_PER_SR_S,
     acquisition_rate,
@@ -185,6 +190,7 @@ class _SeenBefore:
 
     def __init__(self, cells: Cells, which: IntArray, ahead_s: FloatArray) -> None:
         self.seen: Mapping[str, AnyArray] = cells.seen_at(which, ahead_s)
+        self.state_ns = cells.state_ns[which] + np.rint(ahead_s * NANOSECONDS).astype(np.int64)
         self.roster, self.craft = cells.roster, cells.craft[which]
 
     def __len__(self) -> int:
@@ -196,6 +202,10 @@ class _SeenBefore:
     def of_target(self, column: FloatArray) -> AnyArray:
         """Return a column of the roster for each."""
         return column[self.craft]
+
+    def of_row(self, name: str) -> AnyArray:
+        """Return a field that has one value for each instant."""
+        return self.seen[name]
 
 
 class Lookout(Sensor):
@@ -212,8 +222,8 @@ class Lookout(Sensor):
     mark = EYES
     Parameters = LookoutParameters
     remembers = ("_first_seen",)
-    hooks = (DARKNESS,)
-    effects: ClassVar[tuple[Effect, ...]] = (Night(),)
+    hooks = (DARKNESS, TRANSMISSION)
+    effects: ClassVar[tuple[Effect, ...]] = (Night(), CellsInTheWay())
     ladders = (BETWEEN_SCANS,)
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
@@ -239,10 +249,6 @@ class Lookout(Sensor):
             farthest_m = farthest_shown_m(largest_m2, self._smallest_rad) * _MARGIN + _MARGIN_M
             nearer_m = min(self.reach.range_max_m, farthest_m)
             self.reach = replace(self.reach, range_max_m=nearer_m)
-
-    def warnings(self) -> list[str]:
-        """Say that cells of weather have no effect."""
-        return [*super().warnings(), *cells_warnings(self)]
 
     def request(self, port: str) -> Any:
         """Ask for the flights too: aircraft may be acquired between scans."""
@@ -377,6 +383,8 @@ class Lookout(Sensor):
             beta_per_sr_s=self.p.beta_per_sr_s,
             extinction_per_m=self._extinction_per_m,
         )
+        for left in self.built(TRANSMISSION):
+            rate = rate * values_of(self, left, view)
         return rate
 
     def _shows(self, seat: _Seat, view: Any) -> BoolArray:

@@ -53,12 +53,12 @@ def uncertain_violation_span(
 
 
 def _vertical(volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, end_s: Any) -> Span:
-    above = _upper_part(volume, up, climb, e, end_s)
-    below = _upper_part(volume, -up, -climb, e, end_s)
+    above = _span_above(volume, up, climb, e, end_s)
+    below = _span_above(volume, -up, -climb, e, end_s)
     return _hull(above, below)
 
 
-def _upper_part(volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, end_s: Any) -> Span:
+def _span_above(volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, end_s: Any) -> Span:
     """Return the hull over the relative heights that are not negative."""
     low, high = np.maximum(up - e.height_m, 0.0), up + e.height_m
     slow, fast = climb - e.climb_mps, climb + e.climb_mps

@@ -217,7 +217,7 @@ class PairsInPlane:
         before, after = (self._closest_between_samples(step, every) for step in steps)
         nearer = after[3] < before[3]
         time_s, level_m, up_m, best_m = np.where(nearer, after, before)
-        own, other = self._ways(np.where(nearer, steps[1], steps[0]), every)
+        own, other = self._velocities(np.where(nearer, steps[1], steps[0]), every)
         angles = _angles_deg(own, other)
         closest = np.array([time_s, level_m, up_m, np.hypot(*(other - own)), *angles % 360.0])
         # Wherever a pair may be closest, and over one sample more to both sides.
@@ -230,7 +230,7 @@ class PairsInPlane:
         wider[1:] |= near_by[:-1]
         wider[:-1] |= near_by[1:]
         step, pair = wider.nonzero()
-        own, other = self._ways(step, pair)
+        own, other = self._velocities(step, pair)
         off = (_angles_deg(own, other) - angles[:, pair] + 180.0) % 360.0 - 180.0
         between = np.zeros((2, 2, self._count))
         for k in (0, 1):
@@ -270,7 +270,7 @@ class PairsInPlane:
         level_m = np.hypot(north, east)
         return np.array([time_s, level_m, np.abs(up), np.hypot(level_m, up)])
 
-    def _ways(self, step: IntArray, pair: IntArray) -> tuple[FloatArray, FloatArray]:
+    def _velocities(self, step: IntArray, pair: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return velocities in the plane of both aircraft from a sample to the next, (2, n)."""
         own, other = (
             (at[:2, step + 1, pair] - at[:2, step, pair]) / self._lasts_s[step]
@@ -293,7 +293,9 @@ def _angles_deg(own: FloatArray, other: FloatArray) -> FloatArray:
 def _enters(
     apart: FloatArray, moved: FloatArray, horizontal_m: float, vertical_m: float
 ) -> BoolArray:
-    """Return which straight ways from `apart` on, both (3, n), come inside a cylinder."""
+    """Return which straight relative displacements `moved` from `apart`, both (3, n), enter a
+    cylinder.
+    """
     begin, end, crosses = _interval_in_radius(apart, moved, horizontal_m)
     low, high = _interval_in_height(apart[2], moved[2], vertical_m)
     first = np.maximum(np.maximum(begin, low), 0.0)

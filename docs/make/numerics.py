@@ -22,6 +22,8 @@ SECTIONS: list[tuple[str, Callable[[], list[NumericalCase]]]] = [
 
 _HEAD = """# Hard cases
 
+Where do straightforward formulas fail, and what comes out here?
+
 Results of the straightforward formula and of dsa_des, and the true value. Printed by
 `python -m docs.make.numerics` (needs the extra `test`); `--check` compares this page with the
 results of your machine. The naive column may differ in its last digits from machine to machine:

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from components.benchmark.measure import pin
+from components.benchmark.measure import pin_to_one_processor
 from components.benchmark.scenes import CASES, engine_run, peak_mb, replicas_of, scene_of
 from dsa_des.record.sinks import MemorySink
 from dsa_des.scene.scene import Scene
@@ -55,7 +55,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def point(axis: str, value: float) -> dict[str, Any]:
     """Measure one point in this process."""
-    pin()
+    pin_to_one_processor()
     scene, scenes = _scenes(axis, value)
     to_disk = axis in ("simulated time, s", "replicas")
     runs = [engine_run(scene, scenes, None if to_disk else MemorySink()) for _ in range(_REPEATS)]

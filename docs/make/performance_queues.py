@@ -11,7 +11,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from components.benchmark.measure import pin
+from components.benchmark.measure import pin_to_one_processor
 from components.benchmark.scenes import CLOCKED
 from components.examples import folder
 from dsa_des.record.arrow import ParquetSink
@@ -69,7 +69,7 @@ def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     return {"scene": variant.name, "simulated_s_per_s": median(rates[2:] or rates)}
 
 
-def fresh(name: str, quick: bool, repeats: int) -> dict[str, Any]:
+def measure_in_new_process(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     """Return the row of one way to share a processor, measured in a process of its own."""
     command = [sys.executable, "-m", "docs.make.performance_queues", name, f"--repeats={repeats}"]
     command += ["--quick"] if quick else []
@@ -85,7 +85,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--repeats", type=int, default=5)
     options = parser.parse_args(arguments)
-    pin()
+    pin_to_one_processor()
     say_json(measured(options.name, options.quick, options.repeats))
     return 0
 

@@ -8,8 +8,8 @@ from dsa_des.answers.alternatives import AS_IT_IS
 from dsa_des.answers.report import AnswerReport
 from dsa_des.answers.verdicts import ModelVerdict
 from dsa_des.block.mark import RED
-from dsa_des.costs.output import Label, put_labels
-from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
+from dsa_des.costs.cost_report import Label, put_labels
+from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts, plain_log_ticks
 from dsa_des.results.labels import unit_of
 
 _GREY, _ALLOWED = "#777777", "#e4efe4"
@@ -32,7 +32,7 @@ def draw_answers(path: Path, report: AnswerReport) -> None:
         for number, result in enumerate(report.results, start=1):
             axes = figure.add_subplot(rows, columns, number)
             drawn.append((axes, _draw_panel(axes, report, result.name)))
-        tight(figure)
+        fit_axes_to_texts(figure)
         for axes, labels in drawn:  # where points are is known only now
             put_labels(axes, labels)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from dsa_des.answers.alternatives import AS_IT_IS, COLUMN
 from dsa_des.answers.changes import PairedChange, confidence_of_each
-from dsa_des.answers.turns import TurnTimes
+from dsa_des.answers.models_in_turns import TurnTimes
 from dsa_des.answers.verdicts import (
     BEYOND,
     NOTHING,
@@ -146,7 +146,7 @@ class AnswerReport:
         """Return the conclusions of a result's table, the decision first."""
         some = self.verdicts[name]
         result = next(one for one in self.results if one.name == name)
-        lines = [self._of_itself(result)]
+        lines = [self._result_text(result)]
         taken = sorted((v for v in some if v.is_acceptable), key=lambda v: self._cost(v.model))
         limit = self._limit_text(name)
         sure = f"{100 * self.confidence:g} %"
@@ -156,15 +156,15 @@ class AnswerReport:
         else:
             lines.append(f"No model is surely within {limit}.")
         lines.append(self._cheapest(taken))
-        lines += self._of_kind(taken, WITHIN, "Within it:", self._within_text)
-        lines += self._of_kind(taken, SAME, self._same_words(taken), self._cost_text)
-        lines += self._of_kind(some, BEYOND, f"Surely changed by more than {limit}, or no longer "
+        lines += self._list_kind(taken, WITHIN, "Within it:", self._within_text)
+        lines += self._list_kind(taken, SAME, self._explain_sameness(taken), self._cost_text)
+        lines += self._list_kind(some, BEYOND, f"Surely changed by more than {limit}, or no longer "
                                "there:", self._beyond_text)  # fmt: skip
-        lines += self._of_kind(some, OPEN, f"Not told by so many {self.unit}:", self._open_text)
-        lines += self._of_kind(some, NOTHING, "Not compared:", lambda verdict: verdict.reason)
+        lines += self._list_kind(some, OPEN, f"Not told by so many {self.unit}:", self._open_text)
+        lines += self._list_kind(some, NOTHING, "Not compared:", lambda verdict: verdict.reason)
         return [line for line in lines if line]
 
-    def _of_itself(self, result: Result) -> str:
+    def _result_text(self, result: Result) -> str:
         owns = {c.at: c for c in self.changes if c.result.name == result.name}
         if not owns:
             return f"{result.name}: no model has runs to compare."
@@ -204,7 +204,7 @@ class AnswerReport:
         assert verdict.change is not None
         return f"{amount_text(verdict.change)}, {self._cost_text(verdict)}"
 
-    def _same_words(self, taken: Sequence[ModelVerdict]) -> str:
+    def _explain_sameness(self, taken: Sequence[ModelVerdict]) -> str:
         """Return what it means that every run gave the same, for as many as there were."""
         runs = min((v.change.runs for v in taken if v.kind == SAME and v.change), default=0)
         least = -runs / math.log((1.0 - self.confidence) / max(1, self.comparisons))
@@ -231,7 +231,9 @@ class AnswerReport:
                 if (c.model, c.result.name) == (verdict.model, verdict.result.name)]  # fmt: skip
         return f"{self._cost(verdict.model):.2g}, at most {_plain(max(mine))} {unit}".rstrip()
 
-    def _of_kind(self, some: Sequence[ModelVerdict], kind: str, words: str, text: Any) -> list[str]:
+    def _list_kind(
+        self, some: Sequence[ModelVerdict], kind: str, words: str, text: Any
+    ) -> list[str]:
         models: dict[str, list[str]] = {}
         for verdict in some:
             if verdict.kind == kind:

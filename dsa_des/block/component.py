@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from dsa_des.arrays.types import IntArray
@@ -108,6 +109,8 @@ class Component:
     #: parameters, or what its neighbours say, change while a run lasts, another instance goes on
     #: with these. None where the block does not say: it goes on as it is.
     remembers: ClassVar[tuple[str, ...] | None] = None
+    #: Whether one instance goes through all changes of its parameters, and heeds them.
+    heeds_changes: ClassVar[bool] = False
     #: How many targets a row counts as at least, where windows of a single run are sized: what the
     #: block makes of each row is there until its window ends.
     least_width: ClassVar[int] = 4
@@ -160,6 +163,7 @@ class Component:
         return cls
 
     @classmethod
+    @lru_cache(maxsize=512)
     def all_hooks(cls) -> tuple[Hook[Any], ...]:
         """Return the hooks of this class and its bases."""
         found = [hook for base in reversed(cls.__mro__) for hook in vars(base).get("hooks", ())]
@@ -284,6 +288,13 @@ class Component:
             return None
         (one,) = built
         return one
+
+    def heed_change(self, from_s: Fraction, other: Any) -> None:
+        """Be from an instant on what another instance is, that has the parameters of then.
+
+        Of a block that `heeds_changes`; called before anything is offered.
+        """
+        raise TypeError(f"{self.path()} heeds no change")
 
     def take_over(self, before: "Component") -> None:
         """Go on from what this block remembers under the parameters that it had `before`.

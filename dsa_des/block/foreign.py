@@ -92,7 +92,7 @@ class Imports:
     announce: Callable[[Foreign], None] | None = None
     seen: set[Foreign] = field(default_factory=set)
 
-    def about_to(self, foreign: Foreign) -> None:
+    def announce_import(self, foreign: Foreign) -> None:
         """Call the announcement; NotAllowed if nothing foreign may be imported."""
         if self.announce is not None and foreign not in self.seen:
             self.seen.add(foreign)
@@ -130,7 +130,7 @@ def load_named(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
     if policy.announce is not None or not policy.allowed:
         file = file_of(module_name, beside) if path is None else str(path)
         short = module_name if path is None else path.stem
-        policy.about_to(Foreign(key, name, short, file))
+        policy.announce_import(Foreign(key, name, short, file))
     module = _import_module(module_name, beside) if path is None else _import_file(path)
     try:
         with foreign_code():
@@ -156,7 +156,7 @@ def load_point(point: EntryPoint, key: str = "") -> Any:
     elif key:
         policy = _IMPORTS.get()
         if policy.announce is not None or not policy.allowed:
-            policy.about_to(Foreign(key, point.name, point.module, file_of(point.module)))
+            policy.announce_import(Foreign(key, point.name, point.module, file_of(point.module)))
     try:
         with foreign_code(), _redirect_output(point.module):
             return point.load()

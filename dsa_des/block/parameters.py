@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, get_args
 
 from pydantic import (
     BaseModel,
@@ -164,6 +164,16 @@ class Parameters(BaseModel):
             for key in keys
             if getattr(self, key) != fields[key].default
         ]
+
+
+def nested_models(annotation: Any) -> list[type[BaseModel]]:
+    """Return the models of tables that a field holds, in the order in which it names them."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    models: list[type[BaseModel]] = []
+    for argument in get_args(annotation):
+        models += [model for model in nested_models(argument) if model not in models]
+    return models
 
 
 class ClockedParameters(Parameters):

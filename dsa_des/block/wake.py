@@ -59,7 +59,7 @@ class Wake:
         The first run that goes on: rows of those before it never come again.
     clock : callable, optional
         Given scan numbers and their runs, returns when the scan before each was
-        (`RunClock.before`).
+        (`RunClock.previous_ticks`).
     idle : ndarray of bool, shape (rows,), optional
         At which rows nothing came and no scan is: the block is woken as it asked to be
         (`Component.acts_every_s`). By default none.
@@ -160,7 +160,7 @@ class Wake:
         return self._arrived.get(port, [])
 
 
-def by_output(result: Any, outputs: Collection[str]) -> Mapping[str, Message]:
+def messages_by_output(result: Any, outputs: Collection[str]) -> Mapping[str, Message]:
     """Return what a block returned as messages by output name; a lone one goes to the only output.
 
     TypeError if a lone message could go to several outputs.
@@ -184,7 +184,7 @@ def checked_messages(
 
     TypeError or ValueError if one is not what its output declares, or of other instants than `ran`.
     """
-    for port, message in by_output(result, outputs).items():
+    for port, message in messages_by_output(result, outputs).items():
         declared = outputs.get(port)
         if declared is None:
             raise TypeError(f"returned a message for {port!r}, which is not one of its outputs")

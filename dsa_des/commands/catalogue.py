@@ -45,7 +45,7 @@ def show_components(name: str | None, key: str | None = None) -> None:
     table = scene_tables().get(name)
     if table is not None:
         what, rows = table
-        _describe_table(console, name, what, lambda: _of_key(name, key, rows()))
+        _describe_table(console, name, what, lambda: _rows_of_key(name, key, rows()))
         return
     try:
         cls = find(name)
@@ -57,12 +57,12 @@ def show_components(name: str | None, key: str | None = None) -> None:
         raise UsageError(message if ":" not in name else f"{name}: {error}") from error
     if key is not None:
         keys = parameter_rows(cls.Parameters) + parameter_rows(BlockOptions)
-        _print_rows(console, _PARAMETER_HEADS, _of_key(name, key, keys))
+        _print_rows(console, _PARAMETER_HEADS, _rows_of_key(name, key, keys))
         return
     _describe(console, name, cls)
 
 
-def _of_key(name: str, key: str | None, rows: list[Row]) -> list[Row]:
+def _rows_of_key(name: str, key: str | None, rows: list[Row]) -> list[Row]:
     """Return the row of one key and of what is inside it; all rows without a key."""
     if key is None:
         return rows

@@ -11,7 +11,7 @@ from dsa_des.block.foreign import NotImportable, load_named
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.block.registry import UnknownType, find
 from dsa_des.costs.climb import Comparison, RungCost, applies, climb, parse_budgets
-from dsa_des.costs.output import draw_costs, print_ladder, print_rest, write_table
+from dsa_des.costs.cost_report import draw_costs, print_ladder, print_rest, write_table
 from dsa_des.costs.replay import RungRun, run_watched
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import UsageError, did_you_mean
@@ -79,7 +79,7 @@ def cost_of_accuracy(
         progress = CostProgress(silent=as_json)
         try:
             own = run_watched(variants.scene, {name for name, _ in climbs})
-            progress.say(foreseen(climbs, own, repeats), always=True)
+            progress.say(describe_duration(climbs, own, repeats), always=True)
             for number, (name, ladder) in enumerate(climbs, 1):
                 progress.say(f"{name}: {ladder.name} ({number} of {len(climbs)} ladders) ...")
                 try:
@@ -126,7 +126,7 @@ def cost_of_accuracy(
         sys.exit(130)
 
 
-def foreseen(climbs: Climbs, own: Mapping[str, RungRun], repeats: int) -> str:
+def describe_duration(climbs: Climbs, own: Mapping[str, RungRun], repeats: int) -> str:
     """Return how long climbing ladders takes if every rung costs as much as the scene's own."""
     if not climbs:
         return "no ladder to climb"

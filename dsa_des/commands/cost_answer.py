@@ -9,19 +9,19 @@ from typing import Any
 from dsa_des.answers.alternatives import Alternatives, comparable, find_alternatives, with_models
 from dsa_des.answers.changes import changes_by_model
 from dsa_des.answers.figure import draw_answers
+from dsa_des.answers.models_in_turns import Batch, TurnTimes, run_in_turns, turns_of
 from dsa_des.answers.report import AnswerReport, print_report
-from dsa_des.answers.turns import Batch, TurnTimes, run_in_turns, turns_of
 from dsa_des.answers.verdicts import BEYOND, NOTHING, OPEN, Limit, parse_limits
 from dsa_des.commands.cost import CostProgress
 from dsa_des.commands.study import (
-    begun_or_empty,
     check_workers,
     options_as_sets,
+    require_empty_or_resumed,
     result_names,
     stop_with,
     target_of,
 )
-from dsa_des.costs.output import write_table
+from dsa_des.costs.cost_report import write_table
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
 from dsa_des.record.run_folder import write_run_json
@@ -76,16 +76,20 @@ def cost_at_the_answer(
     sets = (*sets, *options_as_sets(swaps, seed, None))
     sets = sets if duration is None else (*sets, f"set.duration_s={duration}")
     described = read_study(path, sets=sets)
-    words = _words("answer", answers) + _words("vary", listed) + _words("budget", budgets)
-    words += _words("block", [block] if block else [])
-    words += _words("repeats", [str(repeats)] if repeats else [])
+    words = (
+        _as_options("answer", answers)
+        + _as_options("vary", listed)
+        + _as_options("budget", budgets)
+    )
+    words += _as_options("block", [block] if block else [])
+    words += _as_options("repeats", [str(repeats)] if repeats else [])
     described.repeat = command_of(["cost", *words], sets, described.path)
     answer = AnswerOfStudy(described, answers, block, listed, budgets, repeats)
     target = target_of(Path("runs"), f"{path.stem}-cost", out, resume)
-    begun_or_empty(target, resume, "what was begun there")
+    require_empty_or_resumed(target, resume, "what was begun there")
     folder = target if isinstance(target, Path) else target()
-    words += [*_words("workers", [str(workers)] if workers else []), "--out", str(folder)]
-    words += ["--no-figures"] * no_figures + ["--json"] * as_json + _words("set", sets)
+    words += [*_as_options("workers", [str(workers)] if workers else []), "--out", str(folder)]
+    words += ["--no-figures"] * no_figures + ["--json"] * as_json + _as_options("set", sets)
     again = shell_line(["dsa-des", "cost", "--resume", *words, "--", scene])
     progress = CostProgress(silent=as_json)
     stopped = answer.run(folder, workers or default_workers(), progress, resume)
@@ -113,7 +117,7 @@ def cost_at_the_answer(
         stop_with(f"interrupted after {answer.done_text()}", again, 130)
 
 
-def _words(option: str, values: Sequence[str]) -> list[str]:
+def _as_options(option: str, values: Sequence[str]) -> list[str]:
     return [word for value in values for word in (f"--{option}", value)]
 
 
@@ -182,7 +186,7 @@ class AnswerOfStudy:
         models = len(self._found.these)
         runs = sum(end - start for batch in self._batches for _, start, end in batch)
 
-        def begun(cpu_s: float) -> None:
+        def announce_rest(cpu_s: float) -> None:
             share = sum(end - start for _, start, end in self._batches[0]) / runs
             rest_s = cpu_s / share * (1 + models) - cpu_s
             with_so_many = "1 process" if workers == 1 else f"{workers} processes"
@@ -193,7 +197,7 @@ class AnswerOfStudy:
                 always=True,
             )
 
-        def after(done: int) -> list[int]:
+        def next_models(done: int) -> list[int]:
             left = self._remaining_models()
             self.turn_times.keep(path / _TURNS, len(self._batches))
             report = self.report()
@@ -203,14 +207,14 @@ class AnswerOfStudy:
 
         try:
             folder.open(description_text(self.study), resume=resume)
-            before = self._take_up(path / _TURNS) if resume else 0
+            before = self._resume_turns(path / _TURNS) if resume else 0
             progress.say(
                 f"{models} models and the scene as it is, {runs:,} runs each, in "
                 f"{len(self._batches)} turns; the scene as it is goes first",
                 always=True,
             )
             run_in_turns(self.study, folder, executor, workers, self._batches, self.turn_times,
-                         begun, after, before)  # fmt: skip
+                         announce_rest, next_models, before)  # fmt: skip
         except KeyboardInterrupt:
             return True
         except (NotWritten, OSError) as error:
@@ -220,9 +224,9 @@ class AnswerOfStudy:
             folder.close()
         return False
 
-    def _take_up(self, path: Path) -> int:
+    def _resume_turns(self, path: Path) -> int:
         """Return how many turns an earlier attempt finished, in as many turns as it was to have."""
-        kept = self.turn_times.take_up(path)
+        kept = self.turn_times.read_earlier(path)
         if kept is None:
             return 0
         done, turns = kept

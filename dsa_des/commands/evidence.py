@@ -4,9 +4,9 @@ import sys
 from pathlib import Path
 
 from dsa_des.commands.study import (
-    begun_or_empty,
     check_workers,
     report_crashes,
+    require_empty_or_resumed,
     run_into,
     target_of,
 )
@@ -44,7 +44,7 @@ def evidence_command(
     path = find_input_file(case, "case")
     checked = read_case(path, sets, encounters)
     location = target_of(_HOME, path.stem, out, resume)
-    begun_or_empty(location, resume, "a pack")
+    require_empty_or_resumed(location, resume, "a pack")
     try:
         inputs = files_of_case(checked).copies()
     except OSError as error:

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from dsa_des.block.parameters import nested_models
 from dsa_des.block.registry import section_models
 from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
 from dsa_des.scene.changes import may_change
@@ -49,16 +50,6 @@ def parameter_rows(
         for inner in nested:
             rows += parameter_rows(inner, f"{prefix}{name}.")
     return rows
-
-
-def nested_models(annotation: Any) -> list[type[BaseModel]]:
-    """Return the models of tables that a field holds, in the order in which it names them."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    models: list[type[BaseModel]] = []
-    for argument in typing.get_args(annotation):
-        models += [model for model in nested_models(argument) if model not in models]
-    return models
 
 
 def _type_name(annotation: Any) -> str:

@@ -205,7 +205,7 @@ def explain_scene(
             console.print(f"{title}: nothing")
     if outside := [item for item in planned if not item.effect.neutral and not item.built]:
         console.print()
-        console.print(_unproven_table(outside))
+        console.print(_table_of_unproven(outside))
 
 
 def _plan_effects(
@@ -226,7 +226,7 @@ def _plan_effects(
     return planned, rows
 
 
-def _unproven_table(items: list[Planned]) -> Any:
+def _table_of_unproven(items: list[Planned]) -> Any:
     """Return a table of the effects that --simulate-everything leaves out, and why."""
     from rich.table import Table
 

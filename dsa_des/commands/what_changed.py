@@ -24,7 +24,7 @@ class ConditionPair:
 
     def __init__(self, one: Tables, rows: IntArray, other: Tables, others: IntArray) -> None:
         self.tables = one, other
-        first, second = _by_key(one, rows), _by_key(other, others)
+        first, second = _row_by_key(one, rows), _row_by_key(other, others)
         self.keys = [key for key in first if key in second]
         #: The rows of both.
         self.rows = [np.array([side[key] for key in self.keys], dtype=np.int64)
@@ -39,7 +39,7 @@ class ConditionPair:
         return first, second
 
 
-def _by_key(tables: Tables, rows: IntArray) -> dict[tuple[Any, ...], int]:
+def _row_by_key(tables: Tables, rows: IntArray) -> dict[tuple[Any, ...], int]:
     columns = [
         [str(label) for label in tables.rows.column(name)[rows]] for name in tables.rows.over
     ]

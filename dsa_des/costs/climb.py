@@ -306,7 +306,7 @@ def _is_same_block(run: RungRun, variants: Variants, block: str) -> bool:
     )
 
 
-def _tie(costs: list[RungCost]) -> None:
+def _equalise_ties(costs: list[RungCost]) -> None:
     """Give costs that count as equal one value."""
     ordered = sorted(costs, key=lambda cost: cost.cpu_us_per_target_scan)
     groups: list[list[RungCost]] = []
@@ -326,7 +326,7 @@ def _mark(
     costs: list[RungCost], budgets: Mapping[str, float], tolerance: Mapping[str, float]
 ) -> None:
     known = [cost for cost in costs if not cost.unavailable]
-    _tie(known)
+    _equalise_ties(known)
     # A reference whose own error is unknown is on the front: nothing is known to beat it.
     points = [
         (c.cpu_us_per_target_scan, 0.0 if c.rung == c.reference and not c.errors else c.error.p95)

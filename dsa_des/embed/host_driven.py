@@ -118,7 +118,7 @@ class _Runner:
     def __init__(self, node: Node, cursor: ScanCursor | None, wires: Iterable[WireOfScene]) -> None:
         component = self.component = node.component
         self.name, self.cursor = component.name, cursor
-        self.before = None if node.clock is None else node.clock.before
+        self.before = None if node.clock is None else node.clock.previous_ticks
         self.pulse = None if node.pulse is None else ScanCursor(node.pulse.first)
         self.demands = [] if cursor else [demand.block for demand in node.demands]
         into: dict[str, list[_Wire]] = {}

@@ -22,7 +22,7 @@ _UNITS = ((86_400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (0.0, "secon
 _SIZES = ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (0.0, "kB"))
 
 
-def foreseen(asked: str, many: int, seconds_each: float, bytes_each: float) -> str:
+def describe_long_work(asked: str, many: int, seconds_each: float, bytes_each: float) -> str:
     """Return what to tell of work before it begins, nothing if it is short.
 
     Parameters

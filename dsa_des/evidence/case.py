@@ -33,13 +33,13 @@ WIRES = "wires"
 CHANGED, AS_STATED = "changed", "as stated"
 
 
-def _printable(text: str) -> str:
+def _check_printable(text: str) -> str:
     if not text.strip():
         raise ValueError("must not be empty")
     return text
 
 
-_Text = Annotated[str, AfterValidator(_printable)]
+_Text = Annotated[str, AfterValidator(_check_printable)]
 
 
 class AssessedSystem(Parameters):
@@ -51,7 +51,7 @@ class AssessedSystem(Parameters):
 
 
 class CaseRequirement(Parameters):
-    """A limit on a result of a study, as somebody asks for it."""
+    """A required limit on a result of a study."""
 
     name: _Text
     text: _Text = Field(description="What is asked for, in words.")
@@ -70,7 +70,7 @@ class CaseRequirement(Parameters):
 
     @property
     def limit(self) -> float:
-        """The number that the result is held against."""
+        """The number that the result is compared with."""
         return self.most if self.most is not None else self.least  # type: ignore[return-value]
 
     def is_met(self, low: float, high: float) -> bool:

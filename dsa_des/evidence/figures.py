@@ -8,7 +8,7 @@ import numpy as np
 
 from dsa_des.block.mark import BLUE, RED, SKY
 from dsa_des.evidence.findings import Finding, ParameterChange
-from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
+from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts, plain_log_ticks
 
 _BAND, _LINE, _LIMIT, _RULE = SKY, BLUE, RED, "#999999"
 _MOST_BARS = 24
@@ -46,7 +46,7 @@ def draw_convergence(findings: Sequence[Finding], confidence: float) -> bytes:
             # Above the plot: beside it, the words would take a third of its width.
             axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
         grid[-1].set_xlabel("encounters")
-        tight(figure)
+        fit_axes_to_texts(figure)
     return drawn.getvalue()
 
 
@@ -72,5 +72,5 @@ def draw_sensitivity(changes: Sequence[ParameterChange]) -> bytes:
             [figure_text(f"{key.removeprefix('blocks.')} = {value}", _LONGEST)
              for key, value in places],
         )  # fmt: skip
-        tight(figure)
+        fit_axes_to_texts(figure)
     return drawn.getvalue()

@@ -1,4 +1,4 @@
-"""What the studies of a case come to: requirement by requirement, and how sure that is."""
+"""The verdicts of a case by requirement, with their confidence."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -98,7 +98,7 @@ def convergence_of(
     """Return the running estimate of a result in order of the replicas, by the case's rule."""
     rule, rows, record = case.tables.convergence, tables.rows, tables.record
     ((_, chosen),) = list(rows.each_place())
-    counts, start = counts_of(len(chosen), rule.over_last)
+    counts, start = running_counts(len(chosen), rule.over_last)
 
     def estimate(many: int) -> Estimate:
         some: IntArray = chosen[:many]
@@ -113,7 +113,7 @@ def convergence_of(
     return Convergence(counts, estimates, start, moved, rule.share * whole)
 
 
-def counts_of(units: int, over_last: float) -> tuple[list[int], int]:
+def running_counts(units: int, over_last: float) -> tuple[list[int], int]:
     """Return at how many units the running estimate is taken, and from which count the rule counts.
 
     The way there is spaced evenly in the logarithm, the last stretch evenly.

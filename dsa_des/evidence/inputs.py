@@ -115,7 +115,7 @@ def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
 
 
 def models_of(study: Study) -> list[dict[str, Any]]:
-    """Return every block of a study's first scene: what it is, and what it was held against."""
+    """Return every block of a study's first scene with the references it was verified against."""
     return [
         {
             "block": name, "type": block.type_name,
@@ -127,7 +127,7 @@ def models_of(study: Study) -> list[dict[str, Any]]:
 
 
 def verified_of(cls: type) -> list[Verified]:
-    """Return what a block's class and its bases were held against."""
+    """Return the references that a block's class and its bases were verified against."""
     return [one for base in reversed(cls.__mro__) for one in vars(base).get("verified", ())]
 
 

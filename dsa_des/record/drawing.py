@@ -194,7 +194,7 @@ def _plain_number(value: float) -> str:
     return f"{value:.0f}" if 1000 <= value < 1e6 else f"{value:.4g}"
 
 
-def tight(figure: "Figure") -> None:
+def fit_axes_to_texts(figure: "Figure") -> None:
     """Fit the axes of a figure to its texts, after these were made plain."""
     _make_plain(figure)
     figure.tight_layout()

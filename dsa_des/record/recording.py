@@ -212,7 +212,7 @@ class Recorder:
         return tables
 
     def _build_pieces(self) -> None:
-        """Make pieces of tables of what came: a few long ones, whatever the messages' lengths."""
+        """Join recorded messages into a few long pieces of tables."""
         groups, self._groups, self._open = self._groups, [], {}
         for block, _, messages, first in groups:
             for table, columns in first or self._combined_tables(block, messages):
@@ -255,7 +255,7 @@ class Recorder:
         del self._groups[mark:]
 
     def advance(self, run: int, tick: int) -> None:
-        """Hand on the rows before a tick of a run, of which no more come, once there are enough."""
+        """Pass on the rows before a tick of a run, once there are enough; no more will come."""
         if self._noted[0] >= _ROWS_AT_ONCE or self._noted[1] >= _PIECES_AT_ONCE:
             self._noted = [0, 0]
             self._build_pieces()

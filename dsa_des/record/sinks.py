@@ -50,7 +50,7 @@ class Sink(Protocol):
         """Take rows of one table, in their final order."""
 
     def close(self) -> None:
-        """Take note that no more rows come."""
+        """Finish: no more rows will follow."""
 
 
 # Smaller pieces are kept as they come: to look at them costs more than they hold.
@@ -77,11 +77,11 @@ class _Keeping:
 
     def _pack(self, name: str, values: Any) -> Any:
         if isinstance(values, Text):
-            return Text(_narrow(values.codes), values.names)
+            return Text(_narrowest_type(values.codes), values.names)
         if isinstance(values, Instants):  # most often those of the rows
             return Instants(self._pack("tick", values.ticks), values.ticks_per_s)
         if values.dtype.kind == "i":
-            values = _narrow(values)
+            values = _narrowest_type(values)
         if not values.strides[0]:
             return values
         for parts in self._parts.values():
@@ -94,7 +94,7 @@ class _Keeping:
         """Nothing to do."""
 
 
-def _narrow(values: AnyArray) -> AnyArray:
+def _narrowest_type(values: AnyArray) -> AnyArray:
     """Return whole numbers in the narrowest type that holds them; constant ones as they are."""
     if not values.strides[0]:
         return values

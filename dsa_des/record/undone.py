@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from dsa_des.arrays.run_ticks import is_single_run
 from dsa_des.arrays.types import BoolArray, IntArray
 
 #: By block and by what its work lacked: how many times, of how many.
@@ -43,6 +44,8 @@ def with_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
     The counts may end before the last run.
     """
     cases = lacking, every
+    if known.shape[1] < 2 and is_single_run(lacking) and is_single_run(every):
+        return known.sum(axis=1, keepdims=True) + np.array([[len(lacking)], [len(every)]])
     runs = max(known.shape[1], *(1 + int(run.max(initial=-1)) for run in cases))
     result = np.zeros((2, runs), dtype=np.int64)
     result[:, : known.shape[1]] = known
@@ -53,7 +56,7 @@ def with_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
 def counts_by_run(
     undone: Mapping[str, IntArray | tuple[int, int]], runs: int
 ) -> dict[str, IntArray]:
-    """Return what a block says (`Component.undone`) as counts of all runs."""
+    """Return a block's answer (`Component.undone`) as counts of all runs."""
     result: dict[str, IntArray] = {}
     for what, counts in undone.items():
         said = np.asarray(counts, dtype=np.int64).reshape(2, -1)
@@ -98,6 +101,9 @@ class Tries:
         """
         if not len(run):
             return self
+        known = self.had[0] if is_single_run(run) and self.did.all() and len(self.did) else 0
+        if known and np.bitwise_or.reduce(had) | known == known:  # as most often
+            return self
         first = np.flatnonzero(np.append(True, run[1:] != run[:-1]))
         mine = run[first]
         count = max(int(mine.max()) + 1, len(self.did))
@@ -109,11 +115,11 @@ class Tries:
 
     def undone(self, what: str, *, of_two: bool = False) -> dict[str, IntArray]:
         """Return in which runs it was never done, of those that had a source, or two."""
-        enough = has_two(self.had) if of_two else self.had != 0
+        enough = has_two_bits(self.had) if of_two else self.had != 0
         return {what: np.array([enough & ~self.did, enough], dtype=np.int64)}
 
 
-def has_two(mask: Any) -> BoolArray:
+def has_two_bits(mask: Any) -> BoolArray:
     """Return which masks have more than one bit."""
     return np.asarray((mask & (mask - 1)) != 0, dtype=bool)
 

@@ -81,7 +81,7 @@ class ReplicaScenes(Sequence[Scene]):
             return [self._scene.blocks[block].parameters] * len(self)
         return [self._parameters_of(block, number) for number in range(len(self))]
 
-    def differing(self, block: str) -> set[str]:
+    def differing_parameters(self, block: str) -> set[str]:
         """Return which of a block's parameters are not the same in all replicas."""
         return {
             str(column.path[0])
@@ -175,7 +175,7 @@ def _column(scene: Scene, key: str, values: Sequence[Any]) -> DrawnColumn:
     if path[2] in BlockOptions.model_fields and path[2] not in type(block.parameters).model_fields:
         raise _NoColumn
     found, model, name = _place(block.parameters, path[2:])
-    return DrawnColumn(block.name, found, _validated_values(model, name, values))
+    return DrawnColumn(block.name, found, _validate_values(model, name, values))
 
 
 def _place(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
@@ -215,7 +215,7 @@ def _can_check_columns(model: type[BaseModel]) -> bool:
         or known.validators
         or any(found.info.mode != "after" for found in known.model_validators.values())
         or any(
-            len(signature(found.func).parameters) > 1 and not _is_of_all(found.func)
+            len(signature(found.func).parameters) > 1 and not _is_common_validator(found.func)
             for found in known.field_validators.values()
         )
         or any(field.default_factory_takes_validated_data for field in model.model_fields.values())
@@ -234,12 +234,12 @@ def _declared_names(cls: type, known: type = BaseModel) -> set[str]:
     return {name for base in bases for name in vars(base)}
 
 
-def _is_of_all(function: Any) -> bool:
+def _is_common_validator(function: Any) -> bool:
     """Return whether it is the validator of extreme numbers that every `Parameters` has."""
     return getattr(function, "__func__", None) is Parameters._computable.__func__  # type: ignore[attr-defined]
 
 
-def _validated_values(model: type[BaseModel], name: str, values: Sequence[Any]) -> list[Any]:
+def _validate_values(model: type[BaseModel], name: str, values: Sequence[Any]) -> list[Any]:
     """Return values of a field that has bounds and nothing else, as it holds them."""
     field = model.model_fields[name]
     union = get_origin(field.annotation) in (Union, UnionType)
@@ -247,7 +247,7 @@ def _validated_values(model: type[BaseModel], name: str, values: Sequence[Any]) 
     ((kind, *others),) = [set(options) - {type(None)}]
     validators = model.__pydantic_decorators__.field_validators.values()
     mine = [v for v in validators if name in v.info.fields or "*" in v.info.fields]
-    if others or not all(_is_of_all(found.func) for found in mine):
+    if others or not all(_is_common_validator(found.func) for found in mine):
         raise _NoColumn
     exact = kind is Fraction
     for check in field.metadata:

@@ -102,15 +102,15 @@ class Replicas(Timeline):
         # What was drawn when it was set up would be the first one's in all of them.
         if not component.serves_replicas() or self.streams.has_drawn_for_all(name):
             return False
-        differing = self._differing(name)
+        differing = self._differing_parameters(name)
         if isinstance(component.p, ClockedParameters):
             differing -= _OF_THE_CLOCK
         return not differing
 
-    def _differing(self, name: str) -> set[str]:
+    def _differing_parameters(self, name: str) -> set[str]:
         """Return which of a block's parameters are not the same in all replicas."""
         if isinstance(self._scenes, ReplicaScenes):
-            return self._scenes.differing(name)
+            return self._scenes.differing_parameters(name)
         first = self._scenes[0].blocks[name].parameters
         names, fields, values = set[str](), type(first).model_fields, vars(first)
         for scene in self._scenes[1:]:
@@ -189,7 +189,7 @@ class Replicas(Timeline):
             raise NotInLockStep(f"block {face.name} gives some replica another duration")
 
     def rehearse(self) -> None:
-        """Make what each replica has for itself, and let it go.
+        """Build each replica's own instances once, to raise their errors, and drop them.
 
         `NotInLockStep` if that shows a reason not to run them together.
         """
@@ -223,7 +223,7 @@ class Replicas(Timeline):
     def clock_specs(
         self, name: str, component: Component, stretch: int | None = None
     ) -> list[ClockSpec]:
-        """Return what each replica says of a block's clock."""
+        """Return each replica's specification of a block's clock."""
         every: list[Any] = []
         known: dict[int, Any] = {}  # by the identity of parameters, which many replicas share
         for parameters in self._parameters_of(name, stretch):
@@ -302,11 +302,11 @@ def _check_alike(scenes: Sequence[Scene]) -> None:
         )
         if not same:
             raise NotInLockStep("the replicas differ in wires, types, duration, ticks or sections")
-        if not _change_alike(scene, first):
+        if not _have_same_changes(scene, first):
             raise NotInLockStep("the replicas differ in what changes while they run")
 
 
-def _change_alike(scene: Scene, first: Scene) -> bool:
+def _have_same_changes(scene: Scene, first: Scene) -> bool:
     """Return whether the same blocks change at the same instants, and are then the same."""
     if [one.from_s for one in scene.stretches] != [one.from_s for one in first.stretches]:
         return False

@@ -15,7 +15,7 @@ from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import STATIC, Message
-from dsa_des.block.wake import Arrivals, Wake, by_output
+from dsa_des.block.wake import Arrivals, Wake, messages_by_output
 from dsa_des.errors import RunRefused
 
 
@@ -50,7 +50,7 @@ class SplitBlock:
         """Let every replica's instance handle its rows."""
         firsts = wake.instants.first_of_each.tolist()
         sent: dict[str, list[Message]] = {}
-        self._let_go(wake.first_run)
+        self._finish_ended_runs(wake.first_run)
         self._keep_waiting(wake)
         for first, end in zip(firsts, [*firsts[1:], len(wake)], strict=True):
             number = int(wake.run[first])
@@ -64,7 +64,7 @@ class SplitBlock:
                     port: _append_arrivals(waiting, part.arrivals(port)),
                 }
             result = self._instances[number].run(part)
-            for port, message in by_output(result, self._outputs).items():
+            for port, message in messages_by_output(result, self._outputs).items():
                 run = np.full(len(message), number, dtype=np.int64)
                 sent.setdefault(port, []).append(message.of_runs(run))
         return {port: _concatenate(parts) for port, parts in sent.items()} or None
@@ -84,11 +84,11 @@ class SplitBlock:
 
         `NotInLockStep` if one of these would have told its neighbours something else.
         """
-        self._let_go(None)
+        self._finish_ended_runs(None)
         for number in sorted(set(range(replicas)) - self._made):
             self._finished(number, self.make(number))
 
-    def _let_go(self, before: int | None) -> None:
+    def _finish_ended_runs(self, before: int | None) -> None:
         for number in sorted(self._instances):
             if before is None or number < before:
                 self._finished(number, self._instances.pop(number))

@@ -60,7 +60,7 @@ Fly = Callable[[Sequence[Replica], IntArray, Sequence[float]], FlownRuns]
 
 @dataclass(frozen=True)
 class Repeated:
-    """What a repetition came to: its estimate, what one run more that comes to the event adds."""
+    """Result of a repetition: its estimate, and what one more run with the event would add."""
 
     probability: float
     unseen: float
@@ -69,7 +69,7 @@ class Repeated:
 
 
 class _Repetition:
-    """The runs of a repetition's present stage, and what they stand for."""
+    """The runs of a repetition's present stage, with their weights."""
 
     def __init__(self, seed: int, roots: Sequence[Replica]) -> None:
         self._seed, self.runs = seed, list(roots)
@@ -96,7 +96,7 @@ class _Repetition:
         self.share = total / self._whole
         self.unseen = self.share / count
         uniform = (key_of(self._seed, "branches", self.stage) >> 11) * 2.0**-53
-        parents = some[chosen_of(self.weights[some], count, uniform)]
+        parents = some[choose_parents(self.weights[some], count, uniform)]
         self.runs = [
             Replica(
                 branch(self.runs[k].seed, instant_ns(reached_s[k]), self._seed_of(number)),
@@ -110,7 +110,7 @@ class _Repetition:
         return key_of(self._seed, "branch", self.stage, number) >> 1
 
 
-def chosen_of(weights: FloatArray, count: int, uniform: float) -> IntArray:
+def choose_parents(weights: FloatArray, count: int, uniform: float) -> IntArray:
     """Return which of some runs `count` branches come from, each as often as it weighs.
 
     Of every run there are as many as expected, to the whole number below or above (systematic

@@ -77,7 +77,7 @@ def _switched_blocks(change: TimedChange) -> set[str]:
     return {str(key[1]) for key in blocks if key[2:] == (_ENABLED,)}
 
 
-def out_between(
+def is_out_between(
     out: TimesOut, blocks: Sequence[str], from_s: FloatArray, to_s: FloatArray
 ) -> BoolArray:
     """Return whether any of some blocks was out between instants of replicas (replicas, n).

@@ -10,7 +10,7 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import BLUE, PALETTE
-from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts
 from dsa_des.results.labels import axis_label, format_with_interval, readable, unit_of, value_label
 from dsa_des.results.maps import Target
 from dsa_des.results.statistics import chi_square_bounds
@@ -83,7 +83,7 @@ def draw_axis(
         bottom = grid[-1]
         bottom.set_xlabel(axis_label(axis))
         _ticks(bottom, values, where, numeric)
-        tight(figure)
+        fit_axes_to_texts(figure)
 
 
 def _positions(values: list[Any], category: bool) -> tuple[dict[Any, float], bool]:
@@ -226,7 +226,7 @@ def draw_polar(
         polar.set_title(f"{figure_text(title, _TITLE)}\n{over}", loc="left")
         if len(series) > 1:
             polar.legend(loc="upper left", bbox_to_anchor=(1.05, 1.0))
-        tight(figure)
+        fit_axes_to_texts(figure)
 
 
 @contextmanager
@@ -239,7 +239,7 @@ def _chart(
         yield axes
         axes.set_title(figure_text(title, _TITLE), loc="left")
         _put_legend_beside(axes)
-        tight(figure)
+        fit_axes_to_texts(figure)
 
 
 #: A label, and the values of its runs, NaN where a run has none.

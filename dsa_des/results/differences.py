@@ -82,7 +82,7 @@ class EstimatedDifference:
     only_second: int
 
     @property
-    def narrower(self) -> float:
+    def narrowing_factor(self) -> float:
         """How many times narrower the paired interval is; infinite where nothing differs."""
         if self.paired.half_width == 0.0:
             return math.inf if self.unpaired.half_width > 0.0 else math.nan

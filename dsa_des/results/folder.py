@@ -143,12 +143,12 @@ class StudyFolder:
                     "of the two cannot be mixed"
                 )
         self.part_names()
-        self._clear()
+        self._remove_abandoned_files()
         path = self.path / STUDY_JSON
         if not known or read_regular(path) != text.encode():  # as an older version wrote it
             self.write_file(STUDY_JSON, text.encode())
 
-    def _clear(self) -> None:
+    def _remove_abandoned_files(self) -> None:
         """Remove what processes left that were killed while they wrote."""
         earlier = r"\.(part-|study\.json|summary\.|differences\.|figure-|scatter-).*\.\d+"
         ours = re.compile(rf"{re.escape(PREFIX)}[0-9a-f]{{12}}|{earlier}")

@@ -106,10 +106,10 @@ _ITEM = re.compile(r"(\w+?)s?\[(\d+)\]")
 def _add_spaces(name: str) -> str:
     name = _ITEM.sub(lambda match: f"{match[1]} {int(match[2]) + 1}", name)
     words = name.replace("_", " ").split(" ")
-    return " ".join(word.upper() if _short(word) else word for word in words)
+    return " ".join(word.upper() if _is_abbreviation(word) else word for word in words)
 
 
-def _short(word: str) -> bool:
+def _is_abbreviation(word: str) -> bool:
     """Return whether a word is an abbreviation: IR, RCS, SNR."""
     two = len(word) == 2 and word.isalpha() and word not in _WORDS
     return two or word in _ABBREVIATIONS or bool(_CONSONANTS.fullmatch(word))

@@ -9,7 +9,7 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import RED
-from dsa_des.record.drawing import drawing, figure_text, tight
+from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts
 from dsa_des.results.labels import axis_label, readable, value_label
 from dsa_des.results.summary import Line
 
@@ -47,7 +47,7 @@ def draw_heat(
         for items, put in ((columns, axes.set_xticks), (rows, axes.set_yticks)):
             step = max(1, len(items) // 16)
             shown = range(0, len(items), step)
-            put(list(shown), [_short(items[k]) for k in shown])
+            put(list(shown), [_short_text(items[k]) for k in shown])
         if values.size <= 150:
             middle = np.nanmean(values) if (many > 0).any() else 0.0
             for (r, c), value in np.ndenumerate(values):
@@ -58,10 +58,10 @@ def draw_heat(
         axes.set_ylabel(axis_label(y))
         axes.set_title(textwrap.fill(figure_text(title, _TITLE), 44), loc="left")
         figure.colorbar(image, label=readable(metric))
-        tight(figure)
+        fit_axes_to_texts(figure)
 
 
-def _short(value: Any) -> str:
+def _short_text(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else figure_text(value)
 
 
@@ -104,8 +104,8 @@ def draw_map(
                 vmin=least, vmax=most, shading="nearest",
             )  # fmt: skip
             _contours(axes, parts, limits)
-            axes.set_xticks(range(len(columns)), [_short(v) for v in columns])
-            axes.set_yticks(range(len(rows)), [_short(v) for v in rows])
+            axes.set_xticks(range(len(columns)), [_short_text(v) for v in columns])
+            axes.set_yticks(range(len(rows)), [_short_text(v) for v in rows])
             names = [value_label(axes_of[k], v) for k, v in zip(others, at, strict=True)]
             axes.set_title("\n".join(names), loc="left", fontsize=8)
         for empty in range(len(panels), wide * tall):
@@ -122,7 +122,7 @@ def draw_map(
             )
             notes.append(f"and lower end of its {100 * confidence:g} % interval")
         figure.suptitle("\n".join(notes), x=0.02, ha="left", fontsize=9)
-        tight(figure)
+        fit_axes_to_texts(figure)
         if image is not None:
             figure.colorbar(image, ax=list(grid.flat), label=readable(metric), shrink=0.9)
 

@@ -103,7 +103,7 @@ def answer_cells(tables: Tables, answer: Answer) -> list[str]:
     notes = ["uneven: a cheaper one meets it, a dearer one does not"] if answer.uneven else []
     notes += ["few"] if estimate.few else []
     return [
-        answer.requirement.text(), answer.requirement.axis, tables.other_values(answer),
+        answer.requirement.text(), answer.requirement.axis, tables.other_axes_text(answer),
         "none" if answer.value is None else short(answer.value), *round_estimate(estimate),
         "none" if answer.estimated is None else short(answer.estimated),
         "; ".join(notes),

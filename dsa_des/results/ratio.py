@@ -163,7 +163,7 @@ def paired_ratio(
     if resamples < 2:
         raise ValueError(f"resamples = {resamples}: must be 2 or more")
     d = None if s is None or predicted is None else _flags("predicted", predicted)
-    y = w * _expansion_factors(m, s, d)
+    y = w * _estimated_flags(m, s, d)
     terms = _terms(w, w * n, y, cluster)
     total, below = math.fsum(w), math.fsum(w * n)
     squares = math.fsum(terms[0] ** 2)
@@ -179,7 +179,7 @@ def paired_ratio(
             flown=_count_flown(n, s),
         )  # fmt: skip
     above = math.fsum(y)
-    induced = _expansion_factors(np.maximum(m - n, 0.0), s, None if d is None else d * (n == 0.0))
+    induced = _estimated_flags(np.maximum(m - n, 0.0), s, None if d is None else d * (n == 0.0))
     added = max(0.0, math.fsum(w * induced))
     left, ratio = above - added, above / below
     each, x, y = terms
@@ -227,7 +227,7 @@ def _gain(
     flown = _count_flown(nominal, stands_for)
     if stands_for is None:
         return flown, 1.0
-    each = (weight * (_expansion_factors(mitigated, stands_for, predicted) - ratio * nominal)) ** 2
+    each = (weight * (_estimated_flags(mitigated, stands_for, predicted) - ratio * nominal)) ** 2
     plain = math.fsum(stands_for * (weight * (mitigated - ratio * nominal)) ** 2)
     plain += sampled - math.fsum(each)
     cost = flown / len(nominal) + FORESEEN_COST
@@ -287,11 +287,11 @@ def influences(
     s = None if stands_for is None else _expansions(stands_for, len(n))
     m, (w, _) = _flags_flown(mitigated, s), scale_by_power_of_two(_weights(weight, len(n)))
     d = None if s is None or predicted is None else _flags("predicted", predicted)
-    result: FloatArray = w * (_expansion_factors(m, s, d) - ratio * n) / math.fsum(w * n)
+    result: FloatArray = w * (_estimated_flags(m, s, d) - ratio * n) / math.fsum(w * n)
     return result
 
 
-def _expansion_factors(
+def _estimated_flags(
     flags: FloatArray, stands_for: FloatArray | None, predicted: FloatArray | None
 ) -> FloatArray:
     """Return what each encounter counts with above the line, but for its weight."""

@@ -267,7 +267,7 @@ class StudyRecord(StudyHead):
     repeat: str = ""
 
     @model_validator(mode="after")
-    def _consistent(self) -> "StudyRecord":
+    def _check_columns(self) -> "StudyRecord":
         axes = {axis.column: axis for axis in self.axes}
         columns = self.schema_of_parts().names
         if len(set(columns)) < len(columns):

@@ -171,8 +171,8 @@ class Rows:
         self.axes = [name for name in axes if name not in over]
         self.over = list(over)
         #: What rows share that belong to the same place, and to the same independent unit.
-        self.places = self._codes(self.axes)
-        self.units = self._codes(self.over if self.over else ["replica"])
+        self.places = self._code_rows(self.axes)
+        self.units = self._code_rows(self.over if self.over else ["replica"])
 
     @cached_property
     def runs(self) -> IntArray:
@@ -210,7 +210,7 @@ class Rows:
         """Return a row as column → value."""
         return {name: _plain(self.column(name)[number]) for name in self.stored.names}
 
-    def _codes(self, names: Sequence[str]) -> IntArray:
+    def _code_rows(self, names: Sequence[str]) -> IntArray:
         codes = np.zeros(len(self.stored), dtype=np.int64)
         for name in names:
             _, code = np.unique(self.column(name), return_inverse=True)
@@ -240,7 +240,7 @@ class Rows:
             if at[column] != baseline and base is not None:
                 yield at[column], (*at[:column], *at[column + 1 :]), base, rows
 
-    def by_unit(self, name: str, rows: IntArray) -> tuple[IntArray, FloatArray]:
+    def mean_by_unit(self, name: str, rows: IntArray) -> tuple[IntArray, FloatArray]:
         """Return the units in some rows and each one's mean value (over its replicas)."""
         values = self.column(name)[rows].astype(float)
         known = ~np.isnan(values)
@@ -262,13 +262,13 @@ class Rows:
         values = self.column(result.name)[rows].astype(float)
         missing = int(np.isnan(values).sum())
         if result.kind not in (EVENT, SHARE):
-            _, of_units = self.by_unit(result.name, rows)
+            _, of_units = self.mean_by_unit(result.name, rows)
             if result.quantile is not None:
                 return quantile(of_units, result.quantile, confidence), missing
             if result.kind == FRACTION:
                 return fraction(of_units, confidence), missing
             if result.unseen is not None:
-                more = self.by_unit(result.unseen, rows)[1]
+                more = self.mean_by_unit(result.unseen, rows)[1]
                 return rare(of_units, more, confidence), missing
             return mean(of_units, confidence, method), missing
         trials = np.ones(len(rows))

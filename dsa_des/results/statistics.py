@@ -337,19 +337,19 @@ def gamma_interval(
 
     more, heaviest = unseen_event(np.maximum(x, y)), float(x.max())
 
-    def below_it(limit: float) -> float:
+    def confidence_below(limit: float) -> float:
         """Return how sure it is that the ratio is below a limit."""
         went, stay = sums(limit)
         return _probability_of_more(went, (stay[0] + more[0], stay[1] + more[1]))
 
-    def above_it(limit: float) -> float:
+    def confidence_above(limit: float) -> float:
         went, stay = sums(limit)
         had = limit * heaviest
         return _probability_of_more(stay, (went[0] + had, went[1] + had * had))
 
     sure = 1.0 - tail
-    low = 0.0 if ratio == 0.0 else _bisect_ratio(above_it, sure, ratio, 0.5)
-    return low, _bisect_ratio(below_it, sure, ratio or 1.0 / len(x), 2.0)
+    low = 0.0 if ratio == 0.0 else _bisect_ratio(confidence_above, sure, ratio, 0.5)
+    return low, _bisect_ratio(confidence_below, sure, ratio or 1.0 / len(x), 2.0)
 
 
 def _probability_of_more(one: tuple[float, float], other: tuple[float, float]) -> float:

@@ -1,4 +1,4 @@
-"""The tables of a study: ``summary.parquet``, and what stands beside it."""
+"""The tables of a study: ``summary.parquet`` and the others of its folder."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -42,7 +42,7 @@ class Tables:
         self.rows = Rows(StoredRows(folder), axes, record.sample_columns)
         self.lines: list[Line] = summarise(
             self.rows, self.results, record.confidence, record.interval,
-            self._earlier() if expected is None else expected,
+            self._analytic_answers() if expected is None else expected,
         )  # fmt: skip
         #: Of each requirement, at every combination of the other axes' values.
         self.answers: list[Answer] = [
@@ -62,7 +62,7 @@ class Tables:
                 record.compare_weight,
             )  # fmt: skip
 
-    def _earlier(self) -> dict[tuple[str, tuple[Any, ...]], float]:
+    def _analytic_answers(self) -> dict[tuple[str, tuple[Any, ...]], float]:
         """Return the analytic answers that the folder's summary holds."""
         table = self.folder.table(SUMMARY)
         if table is None or not {*self.rows.axes, "result", "expected"} <= set(table.column_names):
@@ -137,7 +137,7 @@ class Tables:
             **_columns(self.lines, expected="expected"),
         }  # fmt: skip
 
-    def other_values(self, answer: Answer) -> str:
+    def other_axes_text(self, answer: Answer) -> str:
         """Return the values of the other axes: ``radar.scan_rate_hz = 1, radar.latency_s = 0``."""
         names = [name for name in self.rows.axes if name != answer.requirement.axis]
         return ", ".join(f"{n} = {short(v)}" for n, v in zip(names, answer.at, strict=True))
@@ -147,7 +147,7 @@ class Tables:
         return {
             "requirement": [item.requirement.text() for item in result],
             "axis": [item.requirement.axis for item in result],
-            "others": [self.other_values(item) for item in result],
+            "others": [self.other_axes_text(item) for item in result],
             "cheapest": [None if item.value is None else short(item.value) for item in result],
             "confidence": [one_sided_confidence(self.record.confidence)] * len(result),
             "cheapest_by_estimate": [
@@ -203,7 +203,7 @@ def _values_at(axes: Sequence[str], items: Sequence[Any]) -> dict[str, list[Any]
 
 
 def _columns(items: Sequence[Any], /, **paths: str) -> dict[str, list[Any]]:
-    """Return columns of what stands at dotted paths in items; None behind what is None."""
+    """Return columns of the values at dotted paths in items; None behind what is None."""
     return {name: [_value_at(item, path) for item in items] for name, path in paths.items()}
 
 

@@ -67,11 +67,16 @@ class Assembly:
         before = self.stretches[number - 1] if number else {}
         problems: list[Problem] = []
         for name in self._scenes[number].blocks:
+            if number:
+                components[name] = before[name]
             if not number or self._differs(name, number):
                 with self._preparing(name, problems):
-                    components[name] = self._make_component(name, number)
-            else:
-                components[name] = before[name]
+                    made = self._make_component(name, number)
+                    if number and made.heeds_changes:
+                        from_s = self._scene.stretches[number - 1].from_s
+                        components[name].heed_change(from_s, made)
+                    else:
+                        components[name] = made
         _raise_any(problems)
 
     def _differs(self, name: str, number: int) -> bool:
@@ -79,7 +84,8 @@ class Assembly:
         scene, before = self._scenes[number], self._scenes[number - 1]
         block, old = scene.blocks[name], before.blocks[name]
         if block.parameters is not old.parameters and block.parameters != old.parameters:
-            if block.cls is not old.cls or block.cls.remembers is None:
+            heeds = block.cls.remembers is not None or block.cls.heeds_changes
+            if block.cls is not old.cls or not heeds:
                 message = f"cannot change while a run lasts: {block.cls.path()} is made anew by it"
                 raise SceneError([self._scene.problem(f"blocks.{name}", message)])
             return True

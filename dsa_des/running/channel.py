@@ -66,7 +66,7 @@ class Channel:
         self._passed = [(RunTicks(held.run, np.full(count, tick, dtype=np.int64)), held)]
 
     def state(self) -> tuple[Any, Any]:
-        """Return what waits and what is held, for `set_state`."""
+        """Return waiting and held rows, for `set_state`."""
         return tuple(self._waiting), tuple(self._passed)
 
     def set_state(self, state: tuple[Any, Any]) -> None:
@@ -112,7 +112,7 @@ class Channel:
         return arrivals
 
     def forget(self, tick: int) -> None:
-        """Drop what a reader who only asks what is held, at `tick` or later, can never see.
+        """Drop rows that a reader of held values can never see at `tick` or later.
 
         A slow sensor behind a fast one would otherwise let a message wait for each window between
         two of its scans. Where several runs go, a row is superseded in its own only.
@@ -200,7 +200,7 @@ class Channel:
                 self._pass(new, end)
                 return new[1], rows
         before = concatenate(self._passed)
-        parts = [] if before is None else [_lasts(*_sort_rows(before))]
+        parts = [] if before is None else [_last_of_each_run(*_sort_rows(before))]
         held = concatenate(parts if new is None else [*parts, new])
         if held is None:
             return None
@@ -235,12 +235,12 @@ class Channel:
         return len(reached) == len(runs)
 
     def _remember(self, end: int) -> None:
-        """Keep of what has passed the last row of each run that goes on."""
+        """Keep the last collected row of each run that goes on."""
         runs = self._runs.going
         first = runs.stop if end >= self._runs.run_ticks else runs.start
         going = [part for part in self._passed if part[0].run[-1] >= first]
         held = concatenate(going)
-        self._passed = [] if held is None else [_lasts(*_sort_rows(held))]
+        self._passed = [] if held is None else [_last_of_each_run(*_sort_rows(held))]
 
 
 def _rows(arrivals: RunTicks, message: Message, kept: BoolArray) -> Rows:
@@ -250,7 +250,7 @@ def _rows(arrivals: RunTicks, message: Message, kept: BoolArray) -> Rows:
     return arrivals.take(rows), message.take(rows)
 
 
-def _lasts(arrivals: RunTicks, message: Message) -> Rows:
+def _last_of_each_run(arrivals: RunTicks, message: Message) -> Rows:
     """Return the last row of each run."""
     if len(arrivals) == 1:
         return arrivals, message

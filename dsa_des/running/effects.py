@@ -77,7 +77,7 @@ def build_effects(
     planned = plan(block, tolerance, everything=everything)
     built = {item: _build_effect(block, item.effect) for item in planned if item.built}
     if not everything:
-        block.context.tolerance = unspent(planned, tolerance)
+        block.context.tolerance = remaining_tolerance(planned, tolerance)
     block.context.effects = {
         item.effect.name: effect if wrap is None else wrap(item, effect)
         for item, effect in built.items()
@@ -98,8 +98,10 @@ def _build_effect(block: Component, effect: Effect[Any]) -> Any:
     return value
 
 
-def unspent(planned: Sequence[Planned], tolerance: Mapping[str, float]) -> dict[str, float]:
-    """Return what is left of a tolerance after the bounds of all that it let go."""
+def remaining_tolerance(
+    planned: Sequence[Planned], tolerance: Mapping[str, float]
+) -> dict[str, float]:
+    """Return what is left of a tolerance after the bounds of all effects that were left out."""
     left = dict(tolerance)
     for item in planned:
         if item.verdict.simulated and not item.built:

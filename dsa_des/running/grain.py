@@ -31,7 +31,7 @@ def _without_windows(scene: Scene) -> dict[str, str]:
     return reasons
 
 
-def _hurried_blocks(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
+def _explain_fast_feedback(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
     """Return the blocks that send over the wires that are shorter than scans are apart."""
     stuck = sorted(name for name, cls in scene.classes.items() if not cls.rewindable)
     clocks = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
@@ -132,7 +132,7 @@ def grain_of(scene: Scene, window: int | None) -> Grain:
         ahead = blocks_before_loops(scene.graph)
         if not slow and all(cls.rewindable for cls in scene.classes.values()):
             return Grain(every, True, cut_loops(scene.graph, scene.classes), {}, ahead=ahead)
-        slow = slow or _hurried_blocks(scene, opened)
+        slow = slow or _explain_fast_feedback(scene, opened)
         if not slow:
             return Grain(every, False, opened, {}, ahead=set() if ending else ahead)
     queues = {name: scene.queues[name] for name in sorted(windowed_queues(scene))}

@@ -39,7 +39,7 @@ def _closing(graph: nx.DiGraph, rank: Callable[[Edge], Any]) -> set[Edge]:
 
 
 def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[Edge]:
-    """Return the delayed edges whose removal leaves no loop, as few as come to hand.
+    """Return delayed edges whose removal leaves no loop, few of them.
 
     Edges into inputs that a block can do without are the first to go: that is where a loop closes.
     """
@@ -96,7 +96,8 @@ def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> 
 
     opened = nx.DiGraph(graph)
     for opens in (of_source, lambda edge: _optional(graph, classes, edge)):
-        looped = cycle_numbers(opened)
+        if not (looped := cycle_numbers(opened)):
+            break
         inside = [e for e in opened.edges if looped.get(e[0], -1) == looped.get(e[1], -2)]
         opened.remove_edges_from([edge for edge in inside if opens(edge)])
     return window_order(opened, set(graph), cut_loops(opened, classes))

@@ -93,11 +93,11 @@ class Node:
         return self.component if self.stretched is None else self.stretched.now
 
     @property
-    def things(self) -> list[object]:
-        """All whose attributes hold its state."""
+    def state_objects(self) -> list[object]:
+        """All objects whose attributes hold its state."""
         failing = [] if self.outages is None else [self.outages]
         if self.stretched is not None:
-            return [*failing, *self.stretched.things]
+            return [*failing, *self.stretched.state_objects]
         return [*failing, self.component, *self.component.context.effects.values()]
 
     @property
@@ -139,18 +139,14 @@ class Node:
 
     def undone(self) -> Mapping[str, IntArray]:
         """Return in which runs it never ran, as counts (2, runs), where there are any."""
-        idle = self._idle_runs()
         out = {} if self.outages is None else self.outages.undone()
-        if self.component.process is not None or not idle.any():
+        if self.component.process is not None or self._all_ran:
             return out
         ports = [name for name in self.channels if self.component.inputs[name].is_held]
         why = f", for nothing came at {' and '.join(sorted(ports))}" if ports else ""
+        idle = ~self._ran if len(self._ran) else np.ones(self.simulation.runs.count, dtype=bool)
         never = np.array([idle, np.ones(len(idle))], dtype=np.int64)
         return {f"it never ran{why}": never, **out}
-
-    def _idle_runs(self) -> BoolArray:
-        ran, runs = self._ran, self.simulation.runs.count
-        return np.concatenate([~ran, np.ones(runs - len(ran), dtype=bool)])
 
     def wake_at(self, tick: int) -> None:
         """Let the block run at `tick` (once, however often it is asked)."""
@@ -199,8 +195,9 @@ class Node:
         elif self.on_demand:
             for tick in self._demanded_instants(start, end).tick.tolist():
                 self.wake_at(tick)
-        for tick in self._pulses(start, end).tick.tolist():
-            self.wake_at(tick)
+        if self.pulse is not None:
+            for tick in self.pulse.between(start, end)[1].tick.tolist():
+                self.wake_at(tick)
 
     def quiet_until(self, start: int, ahead: int) -> int:
         """Return a tick, at `start` or later, before which a block in windows does not run.
@@ -213,7 +210,7 @@ class Node:
             clocks += [(demand.clock, demand.lead_ticks) for demand in self.demands]
         if self.pulse is not None:
             clocks.append((self.pulse, 0))
-        ticks = [clock.none_before(start + lead) - lead for clock, lead in clocks]
+        ticks = [clock.next_scan_bound(start + lead) - lead for clock, lead in clocks]
         ticks += [wire.quiet_until() for wire in self._trigger_wires]
         return max(start, min(ticks, default=MAX_TICK))
 
@@ -223,9 +220,6 @@ class Node:
 
     def _demanded_instants(self, start: int, end: int) -> RunTicks:
         return _concatenate([demand.instants_between(start, end) for demand in self.demands])
-
-    def _pulses(self, start: int, end: int) -> RunTicks:
-        return RunTicks.empty() if self.pulse is None else self.pulse.between(start, end)[1]
 
     # -- what ----------------------------------------------------------------------------------
 
@@ -244,7 +238,7 @@ class Node:
             for wire in self._trigger_wires:
                 wire.collect(tick + 1)  # what came to be worked on now is left out with it
             return
-        self._run(_now(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
+        self._run(_instant_of(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
 
     def _run_window(self, start: int, end: int) -> None:
         if self.clock is not None:
@@ -261,7 +255,7 @@ class Node:
                 scans = scans.copy()
                 scans[last_of_run(instants, own)] = numbers
         idle = None
-        if len(pulses := self._pulses(start, end)):
+        if self.pulse is not None and len(pulses := self.pulse.between(start, end)[1]):
             busy = instants
             instants = _concatenate([busy, pulses])
             idle = np.ones(len(instants), dtype=bool)
@@ -287,7 +281,7 @@ class Node:
     def _run(
         self, instants: RunTicks, scans: IntArray, end: int, idle: BoolArray | None = None
     ) -> None:
-        before = None if self.clock is None else self.clock.before
+        before = None if self.clock is None else self.clock.previous_ticks
         if self.outages is not None and not (up := self.outages.is_up(instants)).all():
             instants, scans = instants.take(up), scans[up]
             idle = None if idle is None else idle[up]
@@ -302,7 +296,8 @@ class Node:
             wake = self.outages.drop_unheard(wake)
         ticks = wake.ticks
         if not self._all_ran:
-            self._ran = ~self._idle_runs()
+            if not len(self._ran):
+                self._ran = np.zeros(self.simulation.runs.count, dtype=bool)
             self._ran[wake.run[wake.instants.first_of_each]] = True
             self._all_ran = bool(self._ran.all())
         try:
@@ -337,7 +332,7 @@ class Node:
         self._missed = False
         tick = int(self.simulation.env.now)
         scans = np.array([-1], dtype=np.int64)
-        wake = self._inputs.wake_at(_now(tick), scans, tick + 1, complete=False)
+        wake = self._inputs.wake_at(_instant_of(tick), scans, tick + 1, complete=False)
         assert wake is not None
         return wake
 
@@ -395,5 +390,5 @@ def _no_scan_numbers(rows: int) -> IntArray:
     return _NO_SCAN[:rows]
 
 
-def _now(tick: int) -> RunTicks:
+def _instant_of(tick: int) -> RunTicks:
     return RunTicks(runs_of_single(1), np.array([tick], dtype=np.int64))

@@ -71,7 +71,7 @@ def _notes_of_stretches(simulation: Simulation, said: list[str]) -> Iterator[str
 
 
 def _notes_of_vain_work(simulation: Simulation) -> Iterator[str]:
-    """Say which blocks do again what another one does, or send to nobody what nothing records."""
+    """List blocks that repeat another one's work, or whose messages nobody receives or records."""
     scene, graph = simulation.scene, simulation.scene.graph
     first: list[str] = []
     for name, component in simulation.components.items():
@@ -97,7 +97,7 @@ def _notes_of_vain_work(simulation: Simulation) -> Iterator[str]:
 
 
 def _vain_times(simulation: Simulation, name: str) -> Iterator[str]:
-    """Say which times of a block let it do nothing in this run, or something else than is said."""
+    """List times of a block by which it does nothing in this run, or not what they say."""
     scene, ends_s = simulation.scene, simulation.duration_s
     component = simulation.components[name]
     spec = component.clock_of(component.p)

@@ -83,8 +83,8 @@ class RunningBlock(Protocol):
         """The block itself."""
 
     @property
-    def things(self) -> Sequence[object]:
-        """All whose attributes hold its state."""
+    def state_objects(self) -> Sequence[object]:
+        """All objects whose attributes hold its state."""
 
     @property
     def wires(self) -> Sequence[Channel]:
@@ -164,6 +164,17 @@ _RESTART = 32
 _CONTAINERS = (list, dict, set, deque, np.ndarray)
 
 
+class _Copied(dict[type, bool]):
+    """Whether values of a class are copied: what a block might change in place."""
+
+    def __missing__(self, kind: type) -> bool:
+        self[kind] = issubclass(kind, _CONTAINERS)
+        return self[kind]
+
+
+_copied = _Copied()
+
+
 class Rewinder:
     """Takes all blocks, wires and the record of a run back to how they were.
 
@@ -179,7 +190,7 @@ class Rewinder:
     ) -> None:
         self._recorder = recorder
         self._things: list[Any] = [
-            thing for node in nodes for thing in node.things if hasattr(thing, "__dict__")
+            thing for node in nodes for thing in node.state_objects if hasattr(thing, "__dict__")
         ]
         self._things.append(runs)
         into = [(node.name, channel) for node in nodes for channel in node.wires]
@@ -187,7 +198,7 @@ class Rewinder:
         self._feedback = [channel for name, channel in into if (channel.source, name) in cut_edges]
 
     def watch(self) -> None:
-        """Take note from now on of what comes back."""
+        """Record from now on what arrives over feedback wires."""
         for channel in self._feedback:
             channel.watch()
 
@@ -235,7 +246,7 @@ class RewindingWindows(Windows):
         """
         if self._right is not None or self.start >= self.end_tick:
             return self._right
-        length = max(self._length or self._small(), self._least)
+        length = max(self._length or self._restart_ticks(), self._least)
         end = self.end_after(min(length, self.longest_ticks))
         ahead = end if self._careful else self.end_after(self.longest_ticks)
         if self._ahead > self.start:
@@ -271,20 +282,19 @@ class RewindingWindows(Windows):
         self._ahead = max(self._ahead, window.ahead)
         self._careful = False
         if back is None:
-            self._length = min(2 * (self._length or self._small()), self.longest_ticks)
+            self._length = min(2 * (self._length or self._restart_ticks()), self.longest_ticks)
         else:  # what comes back often comes regularly; at first, or after a hurry, start small
-            length = max(1, back - self._came) if self._came else self._small()
+            length = max(1, back - self._came) if self._came else self._restart_ticks()
             self._length = min(length, self.longest_ticks)
             self._came = back
         return super().commit(window, failure)
 
-    def _small(self) -> int:
+    def _restart_ticks(self) -> int:
         return max(1, min(self.longest_ticks // _RESTART, self._horizon))
 
 
 def _copy_state(state: Mapping[str, Any]) -> dict[str, Any]:
     """Copy what a block might change in place; messages and tables are never changed so."""
     return {
-        name: value.copy() if isinstance(value, _CONTAINERS) else value
-        for name, value in state.items()
+        name: value.copy() if _copied[value.__class__] else value for name, value in state.items()
     }

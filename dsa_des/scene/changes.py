@@ -19,6 +19,7 @@ from math import lcm
 from typing import Any
 
 from dsa_des.block.component import scene_number
+from dsa_des.block.parameters import nested_models
 from dsa_des.block.registry import section_models
 from dsa_des.errors import SceneError, did_you_mean, shown_value
 from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
@@ -185,19 +186,22 @@ def _seconds(scene_file: SceneFile, key: Key, value: Any) -> Fraction | None:
 
 def _explain_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -> str:
     """Return why a key cannot change while a run lasts, and which could; nothing where it can."""
+    rest: list[str | int]
     first, name, *rest = (*key, "", "")
     if first == "blocks" and name in blocks:
         if (cls := blocks[name]) is None:
             return ""  # what is wrong with it is said already
-        allowed = may_change(BlockOptions)
-        if cls.remembers is not None:
-            allowed += may_change(cls.Parameters)
-        elif rest[0] in may_change(cls.Parameters):
+        key = key[2:]
+        of_tables, inside = _allowed_inside(cls.Parameters, key)
+        allowed = may_change(BlockOptions) if len(inside) >= len(key) else ()
+        if cls.remembers is not None or cls.heeds_changes:
+            allowed, rest = allowed + of_tables, list(inside)
+        elif inside[0] in of_tables:
             return (
                 f"cannot change while a run lasts: {cls.path()} does not say what it remembers "
                 "(Component.remembers)"
             )
-        what, rest = f"blocks.{name}, a {cls.__name__},", rest[:-1]
+        what = f"blocks.{name}, a {cls.__name__},"
     elif first == "wires" and not isinstance(name, int):
         return explain_no_item(scene_file.data.get("wires", []), str(name))
     elif first == "wires":
@@ -216,6 +220,20 @@ def _explain_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -
         return f"cannot change while a run lasts: {what} has no key that can"
     hint = did_you_mean(str(rest[0]) if rest else "", allowed)
     return f"cannot change while a run lasts; {what} can change others{hint}"
+
+
+def _allowed_inside(
+    model: type[Any], key: Sequence[str | int]
+) -> tuple[tuple[str, ...], Sequence[str | int]]:
+    """Return which keys may change of the table that a key is in, and the key from there on."""
+    models = [model]
+    for place, part in enumerate(key):
+        if part in (allowed := may_change(*models)) or place == len(key) - 1:
+            return allowed, key[place:]
+        fields = [one.model_fields[str(part)] for one in models if part in one.model_fields]
+        # An item's number or name leads into no other table.
+        models = [inner for of in fields for inner in nested_models(of.annotation)] or models
+    return may_change(model), ("",)
 
 
 def may_change(*models: type[Any]) -> tuple[str, ...]:
@@ -285,7 +303,7 @@ def stretches_of(
                 file.problems += set_value(file, text, value, source)
                 keys[text] = None
         try:
-            before = _sharing(check(file), [before, scene])
+            before = _share_equal_parts(check(file), [before, scene])
         except SceneError as error:
             scene_file.problems += error.problems
             continue
@@ -322,7 +340,7 @@ def _changes_in_force(changes: list[TimedChange], instant: Fraction) -> Iterator
             yield change
 
 
-def _sharing(scene: Any, others: list[Any]) -> Any:
+def _share_equal_parts(scene: Any, others: list[Any]) -> Any:
     """Return a scene that has in common with others what is equal in them."""
     blocks = {
         name: next((o.blocks[name] for o in others if o.blocks.get(name) == block), block)

@@ -174,7 +174,7 @@ def window_order(
 
 
 def queue_key(name: str) -> str:
-    """Return what stands for a shared processor among blocks, whose names hold no colon."""
+    """Return the node of a shared processor in the graph; names of blocks hold no colon."""
     return f"processor: {name}"
 
 

@@ -40,7 +40,7 @@ class Removal:
 
 
 class Removals(list[Removal]):
-    """What stands for ``remove = [...]`` while files are put together."""
+    """Placeholder of ``remove = [...]`` while files are merged."""
 
 
 class Inheritance:
@@ -106,7 +106,7 @@ class Inheritance:
         base[WIRES] = [piece for _, piece in kept]
 
     def note_beside(self, own: Mapping[str, Any], merged: Mapping[str, Any], at: Key) -> None:
-        """Note what stands beside each table of a block that a file is the first to write."""
+        """Note the keys beside each table of a block in the file that writes it first."""
         for key, value in own.items():
             inherited = merged.get(key)
             if not (isinstance(value, dict) and isinstance(inherited, dict)):

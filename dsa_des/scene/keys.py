@@ -52,7 +52,7 @@ def step(container: Any, rest: str) -> tuple[str | int | None, str, str]:
     """
     if isinstance(container, list):
         return _item(container, rest)
-    part = _longest([str(name) for name in container], rest)
+    part = _longest_match([str(name) for name in container], rest)
     part = rest.partition(".")[0] if part is None else part
     return part, part, rest[len(part) :].removeprefix(".")
 
@@ -61,7 +61,7 @@ def _item(items: list[Any], rest: str) -> tuple[int | None, str, str]:
     bracket = rest.startswith("[")
     names = names_of(items)
     inside = rest[1:] if bracket else rest
-    part = _longest([f"{name}]" for name in names], inside) if bracket else _longest(names, rest)
+    part = _longest_match([f"{name}]" for name in names] if bracket else names, inside)
     if part is None:
         part = re.match(r"[^\[\]]*" if bracket else r"[^.\[\]]*", inside)[0]  # type: ignore[index]
     else:
@@ -119,7 +119,7 @@ def name_items(tables: Any, text: str) -> str:
         inside = isinstance(part, int) and isinstance(tables, list) and part < len(tables)
         if isinstance(part, int):
             kind = words.pop() if words else ""
-            ends = _ends(tables[part]) if inside else None
+            ends = _blocks_of_wire(tables[part]) if inside else None
             name = (
                 f"from {ends[0]} to {ends[-1]}:" if ends else _name(tables[part]) if inside else ""
             )
@@ -132,7 +132,7 @@ def name_items(tables: Any, text: str) -> str:
     return ".".join(words) if named else ""
 
 
-def _ends(item: Any) -> list[str]:
+def _blocks_of_wire(item: Any) -> list[str]:
     """Return the blocks that a wire connects; none of what is no wire."""
     if isinstance(item, str) and "->" in item:
         ends = item.split("->")
@@ -148,7 +148,7 @@ def _name(item: Any) -> str:
     return str(name) if isinstance(name, str) else ""
 
 
-def _longest(names: list[str], rest: str) -> str | None:
+def _longest_match(names: list[str], rest: str) -> str | None:
     there = [name for name in names if rest == name or rest.startswith((f"{name}.", f"{name}["))]
     return max(there, key=len, default=None)
 

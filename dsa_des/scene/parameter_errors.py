@@ -119,7 +119,7 @@ def explain(
             if not isinstance(given, list) or len(given) < least:  # else its items were refused
                 problems.append(scene_file.problem(at, f"must be at least {least} values", given))
         elif item["type"].startswith("union_tag"):
-            problems.append(_wrong_kind(scene_file, at, item["ctx"]))
+            problems.append(_kind_problem(scene_file, at, item["ctx"]))
         elif item["type"] == "missing":
             given = [str(k) for k in item["input"]] if isinstance(item["input"], dict) else []
             close = nearest(str(item["loc"][-1]), given)
@@ -155,7 +155,7 @@ def explain(
 
 
 def _names_meant(model: Any, item: Any) -> list[str]:
-    """Return the key of a table that an error speaks of, and of an unknown one what it may mean."""
+    """Return the key that an error is about, and the nearest known ones of an unknown key."""
     if not item["loc"]:
         return []
     name = str(item["loc"][0])
@@ -192,7 +192,7 @@ def _refusal_problem(scene_file: SceneFile, at: Key, message: str, value: Any) -
     return scene_file.problem(at, message)
 
 
-def _wrong_kind(scene_file: SceneFile, at: Key, context: Any) -> Problem:
+def _kind_problem(scene_file: SceneFile, at: Key, context: Any) -> Problem:
     """Return what is wrong with the key that says which of several tables this is."""
     at = (*at, context["discriminator"].strip("'"))
     if "tag" not in context:

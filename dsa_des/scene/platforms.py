@@ -15,6 +15,8 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
     `SceneError` refuses a name that there is not, and a block that is fed from two platforms.
     """
     known = [name for names in moved.values() for name in names]
+    if len(known) < 2 and all(one.options.platform is None for one in scene.blocks.values()):
+        return dict.fromkeys(sorted(scene.blocks.keys() - moved.keys()), next(iter(known), ""))
     near = {name: _feeding(scene, name, between=False) for name in scene.blocks}
     far = {name: _feeding(scene, name, between=True) for name in scene.blocks}
     carrying: dict[str, str] = {}
@@ -31,7 +33,7 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
         raise SceneError(problems)
     left = sorted(scene.blocks.keys() - moved.keys() - carrying.keys())
     while left:  # down the chains, around loops too
-        found = _found(left, near, carrying) or _found(
+        found = _carriers_by_feeders(left, near, carrying) or _carriers_by_feeders(
             [name for name in left if moved.keys() >= set(near[name])], far, carrying
         )
         # What no chain reaches is on the first of all.
@@ -68,7 +70,7 @@ def _feeding(scene: Scene, name: str, *, between: bool) -> list[str]:
     ]
 
 
-def _found(
+def _carriers_by_feeders(
     names: Sequence[str], feeding: Mapping[str, Sequence[str]], carrying: Mapping[str, str]
 ) -> dict[str, str]:
     """Return what carries those of some blocks of which a feeder is known."""

@@ -49,7 +49,7 @@ class Outage(Parameters):
         return f"{blocks}: {what} after {self.mean_between_s:g} s up, for {out_s:g} s, on average"
 
     @model_validator(mode="after")
-    def _each_once(self) -> "Outage":
+    def _check_blocks(self) -> "Outage":
         if len(set(self.blocks)) < len(self.blocks):
             raise ValueError(f"blocks is {list(self.blocks)}: each stands there once")
         if (self.mode == "stuck_bit") != bool(self.stuck):

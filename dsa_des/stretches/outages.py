@@ -68,14 +68,16 @@ class Outages:
         failed = np.zeros(len(instants), dtype=bool)
         for one, edges in zip(self._failing, self._edges, strict=True):
             if one.mode == mode:
-                failed |= _out(edges, instants)
+                failed |= _is_in_outage(edges, instants)
         return failed
 
     def sent(self, port: str, message: Message) -> Message:
-        """Return what comes out of the block's output in place of what it sends."""
+        """Return the message that leaves the block in place of the one that it sends."""
         for one, edges in zip(self._failing, self._edges, strict=True):
             for quantity, worth in one.stuck.items():
-                message = message.with_stuck_bit(_out(edges, message.instants), quantity, worth)
+                message = message.with_stuck_bit(
+                    _is_in_outage(edges, message.instants), quantity, worth
+                )
         return self._frozen(port, message) if self._freezes else message
 
     def _frozen(self, port: str, message: Message) -> Message:
@@ -122,7 +124,7 @@ class Outages:
         return {SECONDS_OUT: seconds}
 
 
-def _out(edges: RunTicks, instants: RunTicks) -> BoolArray:
+def _is_in_outage(edges: RunTicks, instants: RunTicks) -> BoolArray:
     """Return which instants lie in an outage; edges are failures and repairs, in turns."""
     last = last_of_run(edges, instants)
     there = (last >= 0) & (edges.run[last] == instants.run)

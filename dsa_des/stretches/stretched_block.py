@@ -32,8 +32,8 @@ class StretchedBlock:
         return self._instances[self._now]
 
     @property
-    def things(self) -> list[object]:
-        """All whose attributes hold the state of the block, this object among them."""
+    def state_objects(self) -> list[object]:
+        """All objects whose attributes hold the state of the block, this one among them."""
         each = {id(one): one for one in self._instances}.values()
         effects = [effect for one in each for effect in one.context.effects.values()]
         return [self, *each, *effects]

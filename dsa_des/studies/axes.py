@@ -60,7 +60,7 @@ def flatten_axes(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
-    """Return an axis from what a study says of it."""
+    """Return an axis from its entry in a study."""
     if isinstance(spec, list):
         values = spec
     elif not isinstance(spec, dict):
@@ -153,9 +153,9 @@ def _files(key: str, spec: Mapping[str, Any]) -> Axis:
             if not matches:
                 raise ValueError(f"no file matches {base}")
             paths += matches
-        elif _is(base, Path.is_dir):
+        elif _is_readable_as(base, Path.is_dir):
             raise ValueError(f'{base} is a folder; say which files of it, e.g. "{item}/*.daa"')
-        elif _is(base, Path.is_file):
+        elif _is_readable_as(base, Path.is_file):
             paths.append(base)
         else:
             raise ValueError(f"there is no file {base}")
@@ -167,7 +167,7 @@ def _files(key: str, spec: Mapping[str, Any]) -> Axis:
     return Axis(key, labels, sets, ((),) * len(labels), files=True)
 
 
-def _is(path: Path, what: Callable[[Path], bool]) -> bool:
+def _is_readable_as(path: Path, what: Callable[[Path], bool]) -> bool:
     try:
         return what(path)
     except (OSError, ValueError):  # a text that can be no path

@@ -129,7 +129,7 @@ class _Worker:
             with safe_import_path():
                 if self._pool is None:
                     self._pool = _new_pool(self.study)
-                future = self._pool.submit(_work, parts, piece.chunks)
+                future = self._pool.submit(_run_in_worker, parts, piece.chunks)
         except BrokenProcessPool as error:  # it died since we looked
             future = Future()
             future.set_exception(error)
@@ -241,7 +241,7 @@ def _start_worker(study: Study) -> None:
         threading.Thread(target=follow, daemon=True).start()
 
 
-def _work(parts: Parts, chunks: Sequence[Chunk]) -> list[Done]:
+def _run_in_worker(parts: Parts, chunks: Sequence[Chunk]) -> list[Done]:
     try:
         return run_and_write(_studied[0], parts, chunks)
     except KeyboardInterrupt:  # raised by a block: ctrl-C does not come here

@@ -121,7 +121,7 @@ def choose_runs(
     results: Sequence[Result],
     columns: Mapping[str, AnyArray],
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Return for how many runs each one stands, 0 where it is not flown, (runs,); and predictions.
+    """Return the weight of each run, 0 where it is not flown, (runs,); and predictions.
 
     Whether a run is flown depends on its seed and on what is known of it, and on no other run.
     """

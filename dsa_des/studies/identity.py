@@ -98,7 +98,7 @@ def _files_in(value: Any, beside: Sequence[Path]) -> set[Path]:
         return set()
     try:
         files = _module_of(value, beside) or _named_files(value)
-        return set() if files is None else files | _extended_by(files)
+        return set() if files is None else files | _files_extended_by(files)
     except (OSError, ValueError):  # a text that can be no path
         return set()
 
@@ -130,7 +130,7 @@ def _module_of(text: str, beside: Sequence[Path]) -> set[Path] | None:
     return {file} if file.is_absolute() and file.is_file() else None
 
 
-def _extended_by(files: set[Path]) -> set[Path]:
+def _files_extended_by(files: set[Path]) -> set[Path]:
     """Return what TOML files among some extend and name themselves."""
     extended: set[Path] = set()
     for path in files:

@@ -336,7 +336,7 @@ def columns_wanted(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:
 
 
 def missing_values(count: int, *, text: bool) -> AnyArray:
-    """Return what stands for as many values that are not there."""
+    """Return as many missing values."""
     return np.full(count, None, dtype=object) if text else np.full(count, np.nan)
 
 

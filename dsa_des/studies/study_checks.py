@@ -101,7 +101,7 @@ def _check_ends(study: Study, scenes: list[Scene], file: SceneFile) -> None:
             break
 
 
-def _endless(study: Study, scans: float) -> str:
+def _explain_endless(study: Study, scans: float) -> str:
     """Return why a study whose runs have so many scans is not begun, nothing if it is."""
     runs = study.runs_begun * len(study.cells)
     if runs * scans <= MOST_STUDY_SCANS:
@@ -125,7 +125,7 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> None:
         try:
             recorder = Recorder([], wanted=dict.fromkeys(_tables_read(study, scene), ()))
             simulation = Simulation(scene_of(scene, study.replica(0)), recorder=recorder)
-            if wrong is None and (said := _endless(study, simulation.scans)):
+            if wrong is None and (said := _explain_endless(study, simulation.scans)):
                 file.report(("replicas",), said)
                 return
             blocks = simulation.components
@@ -218,7 +218,7 @@ def _check_draws(study: Study, scene: Scene, file: SceneFile) -> None:
     for draw in study.draws:
         if axis := on_axes.get(key_in(tables, draw.key)):
             file.report(("draws", draw.key), f"is set by the axis {axis}: draw it, or vary it")
-        for value in _worst(draw, study):
+        for value in _extreme_values(draw, study):
             try:
                 scene_of(scene, Replica(0, {draw.key: value}))
             except SceneError as error:
@@ -229,7 +229,7 @@ def _check_draws(study: Study, scene: Scene, file: SceneFile) -> None:
                     break
 
 
-def _worst(draw: Draw, study: Study) -> list[Any]:
+def _extreme_values(draw: Draw, study: Study) -> list[Any]:
     """Return the values of a draw that show whether it is allowed.
 
     Those of a normal distribution have no ends: a replica that draws too far out fails by itself.

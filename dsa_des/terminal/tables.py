@@ -46,9 +46,9 @@ def print_table(
     group = used.index(group) if group in used and cells else None
     right = [used.index(k) for k in right if k in used]
     _put_folded(console, printable(title), "italic")
-    if group is None or _total(_natural(names, cells)) <= console.width:
+    if group is None or _total_width(_natural_widths(names, cells)) <= console.width:
         notes_below = [""] * len(cells)
-        if below in used and _total(_natural(names, cells)) > console.width:
+        if below in used and _total_width(_natural_widths(names, cells)) > console.width:
             at = used.index(below)
             notes_below = [row[at] for row in cells]
             names = [*names[:at], *names[at + 1 :]]
@@ -154,18 +154,18 @@ def _pad(text: str, width: int, right: bool) -> str:
     return blanks + text if right else text + blanks
 
 
-def _total(widths: Sequence[int], gap: int = _GAP) -> int:
+def _total_width(widths: Sequence[int], gap: int = _GAP) -> int:
     return sum(widths) + gap * (len(widths) - 1)
 
 
-def _natural(names: list[str], cells: list[list[str]]) -> list[int]:
+def _natural_widths(names: list[str], cells: list[list[str]]) -> list[int]:
     every = [names, *cells]
     return [max(_length(row[k]) for row in every) for k in range(len(names))]
 
 
 def _layout(names: list[str], cells: list[list[str]], most: int) -> _Layout:
     """Return the width of each column and of the gaps; no widths where nothing fits."""
-    widths = _natural(names, cells)
+    widths = _natural_widths(names, cells)
     of_cells = [max((_length(row[k]) for row in cells), default=0) for k in range(len(names))]
     of_words = [
         max((_length(piece.rstrip()) for piece in _PIECES.findall(name)), default=0)
@@ -177,13 +177,13 @@ def _layout(names: list[str], cells: list[list[str]], most: int) -> _Layout:
     words = [_length(word) for row in cells if row for word in row[0].split()]
     named = [max([of_words[0], *words]), *narrow[1:]] if narrow else []
     for floors, gap in ((least, _GAP), (least, 1), (named, 1), (narrow, 1)):
-        while _total(widths, gap) > most:
+        while _total_width(widths, gap) > most:
             spare = [width - floor for width, floor in zip(widths, floors, strict=True)]
             if max(spare, default=0) <= 0:
                 break
             # The widest of those that can give: headings get as many lines as they need.
             at = max(range(len(widths)), key=lambda k: (spare[k] > 0, widths[k]))
             widths[at] -= 1
-        if _total(widths, gap) <= most:
+        if _total_width(widths, gap) <= most:
             return widths, gap
     return [], 1

@@ -71,13 +71,13 @@ class ChangingClock:
             ticks[mine] = np.clip(self._clocks[one].ticks(own), first, end - 1)
         return ticks
 
-    def before(self, scans: IntArray) -> IntArray:
+    def previous_ticks(self, scans: IntArray) -> IntArray:
         """Return when the scan before each was, in ticks of its own run; -1 before the first."""
         earlier = np.asarray(scans, dtype=np.int64) - 1
         return np.where(earlier < 0, -1, self.ticks(np.maximum(earlier, 0)))
 
-    def none_before(self, tick: int) -> int:
-        """Return a tick such that no scan that is not before `tick` is before it."""
+    def next_scan_bound(self, tick: int) -> int:
+        """Return a lower bound of the ticks of all scans at or after `tick`."""
         return tick
 
     def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:

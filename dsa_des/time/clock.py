@@ -42,7 +42,7 @@ def parse_rational(value: object) -> Fraction:
         if not math.isfinite(value):
             raise ValueError("must be finite")
         value = repr(float(value))
-    elif isinstance(value, str) and _too_long(value):
+    elif isinstance(value, str) and _has_too_many_digits(value):
         raise ValueError(_TOO_LONG)
     try:
         number = Fraction(value)
@@ -56,8 +56,8 @@ def parse_rational(value: object) -> Fraction:
 _TOO_LONG = f"must be a number that is a fraction of whole numbers of at most {_MOST_DIGITS} digits"
 
 
-def _too_long(text: str) -> bool:
-    """Tell, without expanding it, whether a text stands for a number of too many digits."""
+def _has_too_many_digits(text: str) -> bool:
+    """Return, without expanding it, whether a text is a number of too many digits."""
     exponent = _EXPONENT.search(text[-_LONGEST_TEXT:])
     return len(text) > _LONGEST_TEXT or (
         exponent is not None and abs(int(exponent[1])) > _LONGEST_TEXT
@@ -163,7 +163,7 @@ class ScanClock:
             ticks = np.maximum(ticks + np.rint(shift).astype(np.int64), 0)
         return ticks
 
-    def before(self, scans: IntArray) -> IntArray:
+    def previous_ticks(self, scans: IntArray) -> IntArray:
         """Return when the scan before each was, in ticks of its own run; -1 before the first."""
         earlier = np.asarray(scans, dtype=np.int64) - 1
         return np.where(earlier < 0, -1, self.ticks(np.maximum(earlier, 0)))
@@ -186,8 +186,8 @@ class ScanClock:
         r, d = self._rest, self._denominator
         return self.offset + scan * self._whole + (2 * scan * r + d) // (2 * d)
 
-    def none_before(self, tick: int) -> int:
-        """Return a tick such that no scan that is not before `tick` is before it."""
+    def next_scan_bound(self, tick: int) -> int:
+        """Return a lower bound of the ticks of all scans at or after `tick`."""
         return self._grid_tick(self.first_scan_at_or_after(tick - self._margin)) - self._margin
 
     def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:

@@ -108,16 +108,16 @@ class GaussMarkov:
     def _values_after_branches(
         self, branches: int, who: Any, instants: IntArray, first: int, runs: IntArray
     ) -> FloatArray:
-        """Return the values of runs that went on by the first so many of their branches."""
+        """Return the values of runs after the first so many of their branches."""
         if not branches:
             return self._draw(self._stream.of_runs(runs), who, instants, first)
-        begin = self._stream.of_branches(runs, branches)[0]
+        begin = self._stream.branches_of_runs(runs, branches)[0]
         before = self._values_after_branches(
             branches - 1, who, np.minimum(instants, begin), first, runs
         )
         later = np.flatnonzero(instants > begin)
         if len(later):
-            begin, stream = self._stream.of_branches(runs[later], branches)
+            begin, stream = self._stream.branches_of_runs(runs[later], branches)
             left = np.exp((begin - instants[later]) / self._tau_ns)
             ends = (instants[later], begin)
             now, then = (self._draw(stream, who[later], at, first) for at in ends)

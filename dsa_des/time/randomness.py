@@ -181,7 +181,7 @@ class Stream:
             which = self._branch_keys(run, begun.sum(axis=-1))
         return _RunStream(self._rounds_of_all.take(which, axis=2))
 
-    def of_branches(self, run: IntArray, number: int) -> tuple[IntArray, "Stream"]:
+    def branches_of_runs(self, run: IntArray, number: int) -> tuple[IntArray, "Stream"]:
         """Return when a branch of each run begins, ns, and its draws; the first is number 1."""
         keys = self._branch_keys(run, np.full(np.shape(run), number))
         return self._begin_ns[run, number - 1], _RunStream(self._rounds_of_all.take(keys, axis=2))

@@ -74,23 +74,23 @@ class RunClock:
             self._last = start, end, self._scans_between(start, min(end, self._runs.run_ticks))
         return self._last[2]
 
-    def none_before(self, tick: int) -> int:
-        """Return a tick, not before this one, before which no run has a scan from this one on."""
+    def next_scan_bound(self, tick: int) -> int:
+        """Return a lower bound of the ticks of all runs' scans at or after `tick`."""
         if self._runs.count > 1 and not self._alike_at_once:
             return tick
         # Who asks goes on in time, and what was found holds up to there.
         if not self._none[0] <= tick <= self._none[1]:
-            self._none = tick, self._clocks[0].none_before(tick)
+            self._none = tick, self._clocks[0].next_scan_bound(tick)
         return max(tick, self._none[1])
 
-    def before(self, scans: IntArray, run: IntArray) -> IntArray:
+    def previous_ticks(self, scans: IntArray, run: IntArray) -> IntArray:
         """Return when the scan before each was, in ticks of its run; -1 before the first."""
         if self._alike:
             shift = self._offsets[run] - self._clocks[0].offset
-            return np.where(scans > 0, self._clocks[0].before(scans) + shift, -1)
+            return np.where(scans > 0, self._clocks[0].previous_ticks(scans) + shift, -1)
         ticks = np.empty_like(scans)
         for one in np.unique(run).tolist():
-            ticks[run == one] = self._clocks[one].before(scans[run == one])
+            ticks[run == one] = self._clocks[one].previous_ticks(scans[run == one])
         return ticks
 
     def _scans_between(self, start: int, end: int) -> Scans:

@@ -10,7 +10,7 @@ from accuracy_scenes import Listener, run, true_errors, write_scene
 from click.testing import CliRunner
 from same_runs import same_as_alone
 
-from components.line_of_sight.rungs import PickedModels
+from components.line_of_sight.model_choice import PickedModels
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.running.simulation import Simulation

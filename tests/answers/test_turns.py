@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from dsa_des.answers.alternatives import Alternative, with_models
-from dsa_des.answers.turns import TurnTimes, turns_of
+from dsa_des.answers.models_in_turns import TurnTimes, turns_of
 from dsa_des.studies.study_file import read_study
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dsa_des.arrays.growing import Growing, GrowingArray
+from dsa_des.arrays.growing_arrays import Growing, GrowingArray
 
 
 def test_each_state_stays_and_values_are_moved_a_few_times_only():

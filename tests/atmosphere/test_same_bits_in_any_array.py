@@ -24,7 +24,7 @@ from components.navigation.errors import displaced_position
 from components.optical.detection import detection_probability, false_alarm_direction
 from components.radar.beam import illumination_offset_s
 from components.radar.detection.clutter import clutter_detection_probability
-from components.radar.detection.output import (
+from components.radar.detection.detector_output import (
     false_alarm_count,
     false_alarm_snr,
 )

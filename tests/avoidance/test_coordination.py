@@ -1,5 +1,7 @@
 """Two that avoid tell each other which side they have chosen (``address``)."""
 
+import itertools
+
 import numpy as np
 import pytest
 from covering import covers
@@ -13,10 +15,13 @@ B = {"name": "b", "lat_deg": 52.08, "lon_deg": 4.4, "alt_m": 1000, "heading_deg"
      "speed_mps": 60}  # fmt: skip
 
 
-def head_on(addresses=(None, None), told=None, seed=1, offset_s=0, **keys):
+def head_on(addresses=(None, None), told=None, seed=1, offset_s=0, below=None, **keys):
     """Return two that meet head on at one altitude, the one the other's image, and climb."""
     wires, blocks = [], {}
     traffic = {"type": "traffic.scripted", "ownship": OWN, "intruders": [B]}
+    if below is not None:  # a third one behind the first, nearer to the ground
+        low, alt_m = OWN | {"name": "low", "lat_deg": 51.98, "alt_m": below[1]}, {"alt_m": below[0]}
+        traffic |= {"ownship": OWN | alt_m, "intruders": [B | alt_m, low]}
     for suffix, platform, address in zip(("", "_b"), (None, "b"), addresses, strict=True):
         on = {} if platform is None else {"platform": platform}
         blocks[f"alerting{suffix}"] = {
@@ -81,6 +86,15 @@ def test_what_is_lost_or_old_leaves_both_free():
     assert climbs(head_on((1, 2), {"delay_s": 0.5, "drop_probability": 1.0})) == free
     assert climbs(head_on((1, 2))) == free
     assert climbs(head_on((1, 2), {"delay_s": 0.5}, heeds_s=0.25)) == free
+
+
+def test_who_cannot_go_the_other_way_waits_until_it_may_choose_again():
+    """Under the first one flies a third: at first there is no way down for who has to descend."""
+    found = climbs(head_on((1, 2), {"delay_s": 0.5}, below=(250, 90)))["avoidance_b"]
+    (at_s, side), (then_s, then), *_ = found
+    assert (side, then) == (1.0, -1.0) and at_s + 2.0 < then_s < at_s + 10.0
+    for (before_s, one), (after_s, other) in itertools.pairwise(found):
+        assert other == -one or after_s - before_s >= 10.0
 
 
 def test_a_message_that_is_lost_is_told_again():

@@ -7,10 +7,10 @@ from components.benchmark.track_updates import (
     LOOKS,
     _looks,
     _start_tracks,
-    by_stone_soup,
     listening,
     plain_looks,
-    plainly,
+    plain_updates,
+    stone_soup_updates,
     track_plainly,
 )
 from components.messages.state_tracks import COVARIANCE
@@ -34,7 +34,7 @@ def test_the_plain_loop_comes_to_the_states_of_our_tracker():
 
 
 def test_updates_are_counted_and_done():
-    count, track = plainly(2)
+    count, track = plain_updates(2)
     assert count == 2 * (LOOKS - 1)
     states, _ = track()
     assert len(states) == 2
@@ -42,6 +42,6 @@ def test_updates_are_counted_and_done():
 
 def test_stone_soup_tracks_the_same_detections():
     pytest.importorskip("stonesoup", reason="needs the extra stonesoup")
-    count, track = by_stone_soup(2)
+    count, track = stone_soup_updates(2)
     assert count == 2 * 26
     track()

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from dsa_des.block.effect import Effect, Verdict
-from dsa_des.running.effects import plan, unspent
+from dsa_des.running.effects import plan, remaining_tolerance
 
 
 class _Bounded(Effect):
@@ -46,7 +46,7 @@ def test_bounds_together_stay_within_the_tolerance(allowed, names):
     planned = plan(block(*FOUR), {"pd": allowed + 1e-12})
     assert left_out(planned) == names
     spent = sum({"large": 0.06, "small": 0.02, "middle": 0.03}[name] for name in names)
-    left = unspent(planned, {"pd": allowed, "angle": 1.0})
+    left = remaining_tolerance(planned, {"pd": allowed, "angle": 1.0})
     assert left == {"pd": pytest.approx(allowed - spent), "angle": 1.0}
 
 

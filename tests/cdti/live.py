@@ -84,7 +84,8 @@ class Session:
             picture = control.scope.picture(time_s, received)
             self._reached = self._reached or bool(self._until({"t": time_s, **picture}))
             if self._reached and not self._stands.is_set():
-                control._server.show()  # pages get this very picture, whatever they had before
+                # Pages get this very picture, whatever they had before.
+                control._server.announce_picture()
                 self.stands_at_s = time_s
                 self._stands.set()
             return self._reached

@@ -30,8 +30,10 @@ def test_the_first_page_decides_and_the_second_watches():
 
 def test_a_token_is_of_one_run_and_not_to_be_guessed():
     door, other = Admission(), Admission()
-    assert door.knows(door.token) and not door.knows(other.token)
-    assert not door.knows("") and not door.knows(door.token[:-1]) and not door.knows("\udcff")
+    assert door.is_token(door.token) and not door.is_token(other.token)
+    assert (
+        not door.is_token("") and not door.is_token(door.token[:-1]) and not door.is_token("\udcff")
+    )
     assert len(door.token) >= 32
 
 
@@ -45,7 +47,7 @@ def test_a_new_address_decides_where_the_old_one_no_longer_does():
     assert door.role(old, "") == (WATCHER, "")
     assert door.role(new, "")[0] == OPERATOR
     assert door.role(old, key) == (WATCHER, "")  # who comes back late has lost its place
-    assert door.knows(old) and door.knows(new)
+    assert door.is_token(old) and door.is_token(new)
 
 
 ID = "0123456789abcdef"

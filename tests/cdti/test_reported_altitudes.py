@@ -11,17 +11,20 @@ GLIDER = {"name": "glider", "east_m": -2000.0, "north_m": -3500.0, "up_m": -100.
 RADAR = {"type": "radar.range_boundary", "scan_rate_hz": 2, "range_km": 20.0}
 
 
-def test_altitude_and_climb_of_who_reports_them():
+@pytest.mark.parametrize("qnh_hpa", [1013.25, 983.25])
+def test_altitude_and_climb_of_who_reports_them(qnh_hpa):
     tcas = {"type": "surveillance.active", "scan_rate_hz": 1, "elevation_deg": [-60, 60]}
     scene = chain(
         {"radar": RADAR, "tcas": {**tcas, "replies": "certain", "far_every": 1}},
         targets=[TRF3, GLIDER], duration_s=12.2, fusion={"type": "fusion.pick_best"},
-        tracker={"type": "tracking.stub"},
+        tracker={"type": "tracking.stub"}, weather={"qnh_hpa": qnh_hpa},
     )  # fmt: skip
     scope, recorded = displayed(scene)
     found = {scope.name_of(row[0]): row for row in scope.picture(12.2)["contacts"]}
     last = [row for row in recorded["detections"] if row["block"] == "tcas"][-1]
-    own_alt_m = scope.picture(12.2)["own"]["alt"]
+    # What the own altimeter reads, as linear as below 11 km.
+    share = (qnh_hpa / 1013.25) ** 0.190263
+    own_alt_m = 288.15 / 0.0065 * (1 - share) + share * scope.picture(12.2)["own"]["alt"]
     assert last["target"] == "TRF3"
     assert found["TRF3"][3] == pytest.approx(last["reported_alt_m"] - own_alt_m, abs=0.1)
     assert found["TRF3"][8] == pytest.approx(4.0, abs=25.0 * 0.3048 / 5.0)

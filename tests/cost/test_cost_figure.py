@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.costs.climb import Comparison, RungCost
-from dsa_des.costs.output import _cells, draw_costs, put_labels
+from dsa_des.costs.cost_report import _cells, draw_costs, put_labels
 from dsa_des.costs.replay import Spread
 from dsa_des.record.drawing import keep_figures
 

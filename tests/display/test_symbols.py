@@ -12,10 +12,10 @@ from components.display.symbols import (
     OWN,
     TARGET,
     Labels,
-    by_target,
     draw_density,
     draw_lines,
-    evenly,
+    rows_by_target,
+    spread_indices,
     stagger_marks,
     styles_of,
     targets_key,
@@ -128,19 +128,19 @@ def test_gaps_stay_gaps_and_unknown_places_are_left_out():
 
 
 def test_evenly_keeps_both_ends():
-    assert evenly(3, 5).tolist() == [0, 1, 2]
-    kept = evenly(1000, 7)
+    assert spread_indices(3, 5).tolist() == [0, 1, 2]
+    kept = spread_indices(1000, 7)
     assert (kept[0], kept[-1], len(kept)) == (0, 999, 7)
 
 
 def test_rows_by_target():
-    groups = by_target(np.array([2, 0, 2, 5, 0]))
+    groups = rows_by_target(np.array([2, 0, 2, 5, 0]))
     assert [(target, rows.tolist()) for target, rows in groups] == [
         (0, [1, 4]),
         (2, [0, 2]),
         (5, [3]),
     ]
-    assert by_target(np.empty(0, dtype=np.int64)) == []
+    assert rows_by_target(np.empty(0, dtype=np.int64)) == []
 
 
 KINDS = [marks.RADAR, marks.EO, marks.IR, marks.FUSION, marks.TRACKER]

@@ -2,7 +2,7 @@
 
 from click.testing import CliRunner
 
-from components.benchmark.calls import measure_calls
+from components.benchmark.call_times import measure_calls
 from dsa_des.cli import main
 
 

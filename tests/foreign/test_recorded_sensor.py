@@ -170,7 +170,7 @@ def test_plots_in_asterix_are_those_of_the_run_within_its_bits(recorded, tmp_pat
     assert done.exit_code == 0, done.output
     run = dsa_des.run(
         {
-            "seed": 1, "wires": ["radar -> fusion -> tracker"],
+            "seed": 1, "wires": ["radar -> fusion -> tracker"], "weather": {"qnh_hpa": 1000},
             "blocks": {
                 "radar": {"type": "sensor.recorded", "file": str(file), "range_error_m": 15,
                           "azimuth_error_deg": 0.3, "elevation_error_deg": 0.4},
@@ -187,6 +187,7 @@ def test_plots_in_asterix_are_those_of_the_run_within_its_bits(recorded, tmp_pat
         assert abs(after["range_m"] - before["range_m"]) <= 1852 / 512 + 1e-6
         assert abs(after["time_s"] + was[0]["time_s"] - before["time_s"]) <= 1 / 128
     assert run.state_tracks.num_rows > 20
+    assert any("flight levels, taken for heights" in note for note in run.info["notes"])
     stated = [np.radians(0.3) ** 2, np.radians(0.4) ** 2, 225.0]
     names = ("azimuth_variance_rad2", "elevation_variance_rad2", "range_variance_m2")
     assert [now[0][name] for name in names] == pytest.approx(stated)

@@ -17,7 +17,7 @@ from components.guidance.intervals import (
     is_same_value,
     paint_bands,
 )
-from components.guidance.kinds import kind_of
+from components.guidance.manoeuvre_kinds import kind_of
 from components.guidance.situation import Detector, State
 from components.well_clear.relative_motion import nearly_equal
 from components.well_clear.volume import Volume, violates

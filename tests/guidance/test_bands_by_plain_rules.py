@@ -9,7 +9,7 @@ import pytest
 from components.alert_configuration.conf_file import default_values
 from components.alert_configuration.configuration import Alerter, Configuration, Level
 from components.guidance.bands import guidance_of_many
-from components.guidance.kinds import KINDS
+from components.guidance.manoeuvre_kinds import KINDS
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
 from components.well_clear.volume import Volume

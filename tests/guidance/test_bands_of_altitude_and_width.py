@@ -8,7 +8,7 @@ import pytest
 
 from components.alert_configuration.conf_file import read_conf
 from components.guidance.bands import guidance_of_many
-from components.guidance.kinds import KINDS, kind_of
+from components.guidance.manoeuvre_kinds import KINDS, kind_of
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import Detector, State
 from components.well_clear.volume import Volume, violates

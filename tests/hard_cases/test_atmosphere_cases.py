@@ -20,7 +20,7 @@ from components.atmosphere.visibility import fog_visibility_m
 from components.navigation.errors import displaced_position
 from components.radar.beam import illumination_offset_s
 from components.radar.detection.clutter import clutter_detection_probability
-from components.radar.detection.output import false_alarm_count
+from components.radar.detection.detector_output import false_alarm_count
 from components.radar.ground_clutter import ground_clutter_rcs_m2
 
 

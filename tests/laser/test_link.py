@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.laser.link import (
+from components.laser.range_equation import (
     laser_power_w,
     scan_detection_probability,
     shots_on_target,

@@ -14,7 +14,7 @@ from components.geometry import ellipsoid
 from components.geometry.earth_models import LineOfSight
 from components.geometry.ellipsoid import enu_to_geodetic
 from components.geometry.error_bounds import true_reach_m
-from components.line_of_sight.rungs import seeming_look
+from components.line_of_sight.model_choice import seeming_look
 from components.messages.reach import FarthestLook
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink

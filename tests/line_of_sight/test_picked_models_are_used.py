@@ -5,7 +5,7 @@ import math
 import crooked
 from wired import chain, rows, run, sensor
 
-from components.line_of_sight.rungs import angle_text, name_of, range_text
+from components.line_of_sight.model_choice import angle_text, name_of, range_text
 
 NEARLY_LEVEL = {**crooked.OWNSHIP, "pitch_deg": 0.3, "roll_deg": 0.2, "climb_mps": 0.0}
 RADAR = sensor(

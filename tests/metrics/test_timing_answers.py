@@ -202,5 +202,5 @@ def test_pairs_narrow_the_swap_of_fusion_three_times() -> None:
     study = read_study(READY / "fusion_gate.toml", sets=["replicas=12", "runs_per_chunk=100"])
     tables = tables_of(study, Finished(study))  # type: ignore[arg-type]
     drawn = {str(figure.metric) for figure in study.figures}
-    narrower = {c.result.name: c.difference.narrower for c in tables.compared}
+    narrower = {c.result.name: c.difference.narrowing_factor for c in tables.compared}
     assert max(narrower[name] for name in drawn) >= 3

@@ -288,7 +288,8 @@ def _of_calls(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
         each.arg == "out" for each in keywords
     )
     for k, (one, other) in enumerate(pairwise(given)):
-        if _is_text(one) != _is_text(other) or either_way:
+        same = ast.dump(one) == ast.dump(other)
+        if _is_text(one) != _is_text(other) or either_way or same:
             continue
         swapped = [*given[:k], given[k + 1], given[k], *given[k + 2 :]]
         yield "swapped arguments", _with(node, args=swapped)

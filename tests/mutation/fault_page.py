@@ -10,11 +10,8 @@ from faulty_copy import CAUGHT, ROOT, SURVIVED, Outcome
 
 _HEAD = """# Mutation check
 
-A passing test is weak evidence until it has been seen to fail. `tests/mutation/` lists plausible
-programming faults: a key that feeds the wrong function, a quantity in the wrong frame or unit, a
-clock one scan late, an effect that is planned but not called, a metric that confuses two
-distances. A command puts each of them, one at a time, into a copy of the project and runs the
-tests nearest to it.
+Would the tests notice a mistake? `tests/mutation/` lists plausible ones. A command puts
+each of them, one at a time, into a copy of the project and runs the tests nearest to it.
 
 <!-- not run: takes half an hour -->
 ```

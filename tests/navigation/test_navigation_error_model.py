@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from components.navigation.errors import displaced_position, with_navigation_noise
+from components.navigation.errors import add_navigation_variances, displaced_position
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)
@@ -82,7 +82,7 @@ def test_a_report_errs_by_what_it_moves_if_the_pose_is_another(position_m, attit
     azimuth, elevation, range_m = seen(away, pose)
     # Along a tenth of them no range is measured.
     range_m[:4] = np.nan
-    found = with_navigation_noise(
+    found = add_navigation_variances(
         Reports(azimuth, elevation, range_m, pose), position_m, attitude_rad
     )
     tiny, expected = 1e-6, np.array([[1e-6], [4e-6], [9.0]]) + np.zeros((3, 40))

@@ -8,7 +8,7 @@ import pytest
 from scipy.special import bdtr, gammaincc
 
 from components.messages.reach import Reach
-from components.radar.detection.output import (
+from components.radar.detection.detector_output import (
     false_alarm_count,
     false_alarm_snr,
 )

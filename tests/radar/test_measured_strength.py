@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from components.radar.detection import detection_probability
-from components.radar.detection.output import false_alarm_snr, measured_snr
+from components.radar.detection.detector_output import false_alarm_snr, measured_snr
 from components.radar.detection.threshold import detection_threshold
 
 DRAWS = (np.arange(100_000) + 0.5) / 100_000

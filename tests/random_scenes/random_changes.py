@@ -13,6 +13,7 @@ _DRAWS: dict[str, dict[str, tuple[Any, ...]]] = {
         "ownship.heading_deg": (1.5, 200), "ownship.speed_mps": (0, 61.5),
         "ownship.roll_deg": (10,), "intruders[0].east_m": (250, -1500),
         "intruders[0].heading_deg": (10, 190), "intruders[0].rcs_dbsm": (-5, 10),
+        "intruders[0].mode_s": (True, False), "intruders[0].ads_b": ({"nacp": 9}, False),
     },
     "traffic.random": {
         "radius_km": (1, 4), "ownship.heading_deg": (33,), "speed_max_mps": (130,),
@@ -68,6 +69,7 @@ _MAY_CHANGE = (
     "azimuth_resolution_deg", "misalignment_deg", "range_km", "range_resolution_m", "losses_db",
     "minimum_range_m", "false_alarm_probability", "threshold", "false_alarms_per_frame",
     "angle_gate_deg", "range_gate_m", "turn_deg", "pause_s", "rain_rate_mm_h", "latency_s",
+    "mode_s", "ads_b",
 )  # fmt: skip
 _OF_WIRES = {"delay_s": (0, 0.2, "1/3"), "jitter_s": (0, 0.1), "drop_probability": (0, 0.5)}
 

@@ -136,7 +136,7 @@ def test_differences_of_ratios_hold_what_they_share_once() -> None:
         (found,) = compare_axis(rows, "x", 0.0, [ratio(weight="w")], 0.95, "t")
         d = found.difference
         held += d.paired.low <= truth <= d.paired.high
-        widths.append(d.narrower)
+        widths.append(d.narrowing_factor)
     assert 0.925 <= held / rounds <= 0.975 and min(widths) > 1.2
     # Where only one side has an interval by error, the other one's uncertainty still counts.
     n = np.ones(100)

@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from dsa_des.cli import main
-from dsa_des.record.drawing import drawing, tight
+from dsa_des.record.drawing import drawing, fit_axes_to_texts
 from dsa_des.results.curves import _dodge, _edges, draw_cdf, draw_polar
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.results.statistics import Estimate
@@ -152,7 +152,7 @@ def test_ticks_of_a_logarithmic_axis_are_plain_numbers_and_of_another_are_left_a
     axes.plot([2.0, 8.0], [1.0, 2.0])
     axes.set_xscale("log")
     plain = axes.yaxis.get_major_formatter(), axes.yaxis.get_minor_formatter()
-    tight(figure)
+    fit_axes_to_texts(figure)
     shown = [text.get_text() for text in axes.get_xticklabels(which="both")]
     assert {"2", "3", "6"} <= set(shown) and not any("$" in text for text in shown)
     assert plain == (axes.yaxis.get_major_formatter(), axes.yaxis.get_minor_formatter())

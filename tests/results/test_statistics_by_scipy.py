@@ -49,7 +49,7 @@ def test_a_difference_is_the_second_less_the_first_paired_and_not(second):
     assert found.unpaired.value == pytest.approx(np.mean(second) - np.mean(NORMAL))
     assert (found.unpaired.low, found.unpaired.high) == pytest.approx((welch.low, welch.high))
     ratio = (welch.high - welch.low) / (paired.high - paired.low)
-    assert found.narrower == pytest.approx(ratio)
+    assert found.narrowing_factor == pytest.approx(ratio)
     assert bool(ratio > 3.0) is (second is OTHER)
 
 

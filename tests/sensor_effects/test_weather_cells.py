@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from covering import covers
 from same_runs import replicas_of, same_as_alone, same_in_any_window
-from wired import HEARS_ALL, SEES_ALL, chain, rows, run, sensor
+from scipy.stats import norm
+from wired import HEARS_ALL, SEES_ALL, SENSORS, chain, rows, run, sensor
 
 import dsa_des
 from components.atmosphere.attenuation import rain_coefficients
 from components.environment.weather_cells import within_disc
 from dsa_des.errors import SceneError
-from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 
 LAT, LON, ALT_M, SPEED_MPS, APART_M = 52.0, 4.0, 1000.0, 50.0, 8000.0
@@ -24,6 +24,16 @@ BESIDE = {"name": "beside", "east_m": APART_M, "north_m": 0, "up_m": 0, "heading
           "speed_mps": SPEED_MPS, "rcs_dbsm": 0}  # fmt: skip
 RADIUS_M, RATE_MM_H, MOVES_MPS = 1500.0, 20.0, 70.0
 SLOW = {"scan_rate_hz": 0.2}
+#: One shot at the whole of a target 8 km away, whose echo is a few times the noise.
+LASER = {"pattern": "one_shot", "peak_power_w": 2e5, "range_km": 10.0, "azimuth_deg": [-180, 180],
+         "divergence_mrad": 0.1, "noise_equivalent_power_w": 8e-8, "aperture_mm": 100.0,
+         "azimuth_shots": 10, "elevation_shots": 10}  # fmt: skip
+EYE = {
+    "between_scans": "as_at_scan",
+    "azimuth_deg": [-170, 170],
+    "smallest_arcmin": 0,
+    "beta_per_sr_s": 1e5,
+}
 
 
 def metres_per_deg(lat_deg=LAT, alt_m=ALT_M):
@@ -111,21 +121,52 @@ def test_a_camera_loses_contrast_over_the_chord(kind, keys, weather, per_m):
         assert kept == pytest.approx(math.exp(-per_m * chord_m(time_s, 1030.0, 4000.0)), abs=6e-3)
 
 
-@pytest.mark.parametrize("kind", ["radar.swerling", "optical.ir"])
+@pytest.mark.parametrize("kind", ["laser.scanning", "visual.acquisition", "integral"])
+def test_a_laser_and_an_eye_lose_light_over_the_chord(kind):
+    keys = {"laser.scanning": LASER, "visual.acquisition": EYE}
+    keys["integral"] = {**EYE, "between_scans": "integral"}
+    name = kind if kind in SENSORS else "visual.acquisition"
+    made = {"sensor": sensor(name, **{**keys[kind], **SLOW})}
+    dry = by_time(scene(made), "detection_probability")
+    drizzle = cell(1030.0, 4000.0, rain_rate_mm_h=0.4)
+    wet = by_time(scene(made, drizzle), "detection_probability")
+    assert verdicts(scene(made, drizzle))[0].simulated
+    per_m = RAIN_PER_M * (0.4 / RATE_MM_H) ** 0.63
+
+    def left(time_s, ways=1.0):
+        return math.exp(-ways * per_m * chord_m(time_s, 1030.0, 4000.0))
+
+    for time_s, before in dry.items():
+        if kind == "laser.scanning":  # a threshold of 6 deviations of the noise, there and back
+            kept = (6.0 - norm.isf(wet[time_s])) / (6.0 - norm.isf(before))
+            assert kept == pytest.approx(left(time_s, 2.0), abs=0.01)
+        elif time_s:  # of a search that began with the run
+            kept = math.log1p(-wet[time_s]) / math.log1p(-before)
+            over_s = [0.0] if kind in SENSORS else np.linspace(-4.95, -0.05, 50)
+            want = np.mean([left(time_s + ahead_s) for ahead_s in over_s])
+            assert kept == pytest.approx(want, abs=6e-3)
+
+
+@pytest.mark.parametrize(
+    "kind", ["radar.swerling", "optical.ir", "laser.scanning", "visual.acquisition"]
+)
 def test_a_cell_that_holds_everything_is_weather_everywhere(kind):
     radar = {"range_cell_m": 90.0, "azimuth_beamwidth_deg": 6.0, "elevation_beamwidth_deg": 4.0,
              "frequency_hz": 9.4e9, "power_w": 1e5, "swerling": 1}  # fmt: skip
-    made = {"sensor": sensor(kind, **(radar if kind == "radar.swerling" else {}))}
+    keys = {"radar.swerling": radar, "laser.scanning": LASER, "visual.acquisition": EYE}
+    made = {"sensor": sensor(kind, **keys.get(kind, {}))}
     rain = {"rain_rate_mm_h": 15.0, "fog_water_g_m3": 0.02}
+    if kind in ("laser.scanning", "visual.acquisition"):  # whose light is gone in more
+        rain = {"rain_rate_mm_h": 0.03, "fog_water_g_m3": 1e-5}
     tops = {"rain_top_m": 9000.0, "fog_top_m": 9000.0}
     everywhere = run(scene(made, weather={**rain, **tops}, duration_s=3))["looks"]
     within = run(scene(made, cell(0, 0, radius_km=500.0, **rain), weather=tops, duration_s=3))[
         "looks"
     ]
-    names = ["snr_db", "detection_probability"] if kind == "radar.swerling" else ["confidence"]
-    for name in names:
+    names = {"radar.swerling": ["snr_db", "detection_probability"], "optical.ir": ["confidence"]}
+    for name in names.get(kind, ["detection_probability"]):
         want = everywhere[name].to_numpy()
-        assert np.isfinite(want).all()
+        assert np.isfinite(want).all() and (want != 0.0).any()
         assert within[name].to_numpy() == pytest.approx(want, rel=1e-9)
 
 
@@ -189,5 +230,3 @@ def test_wrong_cells_are_said():
         with pytest.raises(SceneError, match="cells") as wrong:
             dsa_des.load_scene(scene({"radar": HEARS_ALL}, cell(0, 0, **keys)))
         assert said in str(wrong.value)
-    laser = dsa_des.load_scene(scene({"laser": sensor("laser.scanning")}, cell(0, 0)))
-    assert any("cells: no effect on this sensor" in n for n in notes_of_scene(Simulation(laser)))

@@ -54,7 +54,7 @@ def test_scenes_are_those_of_each_replica_by_itself(small: Path, drawn: dict[str
         mine = [scene.blocks[name].parameters for scene in together]
         assert together.parameters_of(name) == mine
         fields = type(mine[0]).model_fields
-        assert together.differing(name) == {
+        assert together.differing_parameters(name) == {
             field
             for field in fields
             if any(getattr(p, field) != getattr(mine[0], field) for p in mine)

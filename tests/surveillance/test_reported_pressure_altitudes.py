@@ -13,6 +13,8 @@ import dsa_des
 #: Of [weather]: 20 hPa below the standard are 168 m at sea level and less above.
 LOW = {"qnh_hpa": 993.25}
 WARM = {"temperature_offset_c": 20}
+#: The same air as rows of a sounding.
+SOUNDING = {"temperature_profile_c": [[0, 35], [3000, 15.5]]}
 ADS_B = {"type": "surveillance.ads_b", "reception": "certain", "position_errors": "none",
          "compact": False}  # fmt: skip
 ACTIVE = {"type": "surveillance.active", "replies": "certain", "measurement": "exact",
@@ -62,12 +64,19 @@ def altimeter_m(height_m, qnh_hpa=1013.25, temperature_offset_c=0.0):
     return 288.15 / 0.0065 * (1 - share) + share * warmth * height_m
 
 
-@covers("qnh_hpa", "temperature_offset_c", of=("[weather]",))
-@pytest.mark.parametrize("weather", [LOW, WARM, {**LOW, **WARM}, {"qnh_hpa": 1030}])
+@covers("qnh_hpa", "temperature_offset_c", "temperature_profile_c", of=("[weather]",))
+@covers("geoid_undulation_m", of=("[terrain]",))
+@pytest.mark.parametrize("geoid_m", [0, -32])
+@pytest.mark.parametrize("weather", [LOW, WARM, {**LOW, **SOUNDING}, {"qnh_hpa": 1030}])
 @pytest.mark.parametrize("sensor", [ADS_B, ACTIVE], ids=["ads_b", "active"])
-def test_transponders_report_pressure_altitudes_that_are_taken_for_heights(sensor, weather):
-    simulation, said, rise = heights(sensor, weather)
-    altitude = altimeter_m(1200, **weather)
+def test_transponders_report_pressure_altitudes_that_are_taken_for_heights(
+    sensor, weather, geoid_m
+):
+    top = {"terrain": {"geoid_undulation_m": geoid_m}}
+    simulation, said, rise = heights(sensor, weather, top=top)
+    by_hand = {**weather, **WARM} if "temperature_profile_c" in weather else weather
+    by_hand = {key: by_hand[key] for key in by_hand if "profile" not in key}
+    altitude = altimeter_m(1200 - geoid_m, **by_hand)
     assert said == pytest.approx(altitude, abs=0.05)
     assert rise == pytest.approx(altitude - 900, abs=1)
     assert "heights is 'reported'" in simulation.components["sensor"].warnings()[-1]
@@ -80,7 +89,10 @@ def test_the_own_altimeter_takes_off_what_is_common(sensor, weather):
     simulation, said, rise = heights(sensor, weather, heights="by_own_altimeter")
     assert said == pytest.approx(altimeter_m(1200, **weather), abs=0.05)
     assert rise == pytest.approx(altimeter_m(1200, **weather) - altimeter_m(900, **weather), abs=1)
-    assert simulation.components["sensor"].warnings() == []
+    warm = [
+        "heights is 'by_own_altimeter': 300 m above the ownship -19 m are left, and nobody is told"
+    ]
+    assert simulation.components["sensor"].warnings() == (warm if weather == WARM else [])
 
 
 def test_the_standard_atmosphere_says_and_changes_nothing():
@@ -90,6 +102,55 @@ def test_the_standard_atmosphere_says_and_changes_nothing():
     _, one = tables_of(scene(ADS_B, {}))
     _, other = tables_of(scene(ADS_B, {}, heights="by_own_altimeter"))
     assert one["detections"].equals(other["detections"])
+
+
+def crowd(gva, **sensor):
+    """Return the reports of a hundred aircraft at 1200 m, in wrong air, after some seconds."""
+    crafts = [
+        {"name": f"c{k}", "lat_deg": 52.02 + 1e-3 * k, "lon_deg": 4.0, "alt_m": 1200,
+         "heading_deg": 90, "speed_mps": 70, "ads_b": {"nacp": 9, "gva": gva} if gva else {}}
+        for k in range(100)
+    ]  # fmt: skip
+    own = {"lat_deg": 52, "lon_deg": 4, "alt_m": 900, "heading_deg": 0, "speed_mps": 60}
+    traffic = {"type": "traffic.scripted", "ownship": own, "intruders": crafts}
+    of = {"type": "surveillance.ads_b", "reception": "certain", "heights": "geometric", **sensor}
+    simulation, tables = tables_of(scene(of, {**LOW, **WARM}, {"traffic": traffic}))
+    rows = tables["detections"].to_pydict()
+    last = np.array(rows["time_s"]) == max(rows["time_s"], default=0)
+    return simulation, {n: np.array(v)[last] for n, v in rows.items()}
+
+
+@covers("heights", "pressure_deviation_m", of=("surveillance.ads_b",))
+@covers("intruders.ads_b.gva", of=("traffic.scripted",))
+def test_the_geometric_heights_that_are_sent_beside_know_no_weather():
+    exact = {"position_errors": "none", "compact": False}
+    simulation, rows = crowd(2, **exact)
+    assert len(rows["target"]) == 100
+    assert rows["reported_alt_m"] == pytest.approx(altimeter_m(1200, **LOW, **WARM), abs=0.05)
+    assert rows["reported_height_m"] == pytest.approx(1200, abs=1e-6)
+    assert simulation.components["sensor"].warnings() == []
+    # Both are in steps of 25 ft, of which the height is the sum.
+    _, rows = crowd(2, position_errors="none")
+    assert (np.round(rows["reported_height_m"] / 7.62, 6) % 1 == 0).all()
+    assert np.abs(rows["reported_height_m"] - 1200).max() < 7.63
+    stated_m2 = rows["elevation_variance_rad2"] * rows["range_m"] ** 2
+    assert stated_m2[50:] == pytest.approx(2 * 7.62**2 / 12, rel=0.05)
+    # With errors, 95 % within 45 or 150 m, and as large as is stated.
+    for gva, within_m in ((1, 150), (2, 45)):
+        _, rows = crowd(gva)
+        off_m = rows["reported_height_m"] - 1200
+        deviation = np.hypot(within_m / 1.96, np.sqrt(2 / 12) * 7.62)
+        low, high = chi2.ppf([0.001, 0.999], 100)
+        assert low < (off_m**2).sum() / deviation**2 < high
+        level = rows["range_m"] * np.cos(rows["elevation_rad"])
+        stated_m2 = rows["elevation_variance_rad2"] * level**2
+        assert low < (off_m**2 / stated_m2).sum() < high
+    # Who sends none is not placed.
+    simulation, rows = crowd(None)
+    assert len(rows["target"]) == 0
+    (counts,) = [n for what, n in simulation.components["sensor"].undone().items()
+                 if "no altitude that it takes" in what]  # fmt: skip
+    assert counts[0].sum() > 300
 
 
 RADAR = {"type": "radar.range_boundary", "scan_rate_hz": 1, "range_km": 15, "errors": "stated",

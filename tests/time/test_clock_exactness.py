@@ -188,7 +188,7 @@ def test_jitter_is_its_deviation_times_what_is_drawn_and_less_than_half_a_period
     spec = ClockSpec(Fraction(10), jitter_s=0.004)
     clock = ScanClock(spec, 10**9, lambda scans: np.full(np.shape(scans), drawn))
     assert clock.ticks(np.array([0, 1])).tolist() == [round(first_s * 1e9), round(second_s * 1e9)]
-    assert clock.before(np.array([0, 1, 2])).tolist() == [
+    assert clock.previous_ticks(np.array([0, 1, 2])).tolist() == [
         -1, round(first_s * 1e9), round(second_s * 1e9)
     ]  # fmt: skip
 
@@ -220,7 +220,7 @@ def test_nothing_is_before_the_instant_that_is_said_to_have_nothing_before_it(ji
     spec = ClockSpec(Fraction(30000, 1001), Fraction(1, 8), Fraction(-40), jitter_s)
     clock = ScanClock(spec, 30_000 * 10**6, lambda scans: np.sin(7.0 * scans))
     for tick in np.linspace(0, 10**12, 500).astype(int).tolist():
-        none_before = clock.none_before(tick)
+        none_before = clock.next_scan_bound(tick)
         assert len(clock.between(tick, none_before)[0]) == 0
         first = clock.between(tick, tick + clock.offset + 2 * int(clock.period))[1][0]
         assert none_before <= first

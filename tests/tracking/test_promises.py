@@ -21,7 +21,7 @@ from components.surveillance.reception import (
     do_365_reception_probability,
     time_to_receive_s,
 )
-from components.tracking.promises import Promises
+from components.tracking.due_detections import Promises
 from components.tracking.rules import LastingErrors
 from components.tracking.scans import Scans
 from dsa_des.running.simulation import Simulation
@@ -269,7 +269,10 @@ def test_what_errors_of_two_looks_have_in_common_is_as_by_hand():
     }  # fmt: skip
     lasting = LastingErrors.of(offers, ("eye", "radar", "nose", "ear"))
     assert LastingErrors.of(offers, ("nose",)) is None
-    assert lasting.lasts.tolist() == [True, True, False, True, False] and lasting.sensors == 0b1011
+    assert (
+        lasting.is_correlated.tolist() == [True, True, False, True, False]
+        and lasting.sensors == 0b1011
+    )
 
     def common(row, sensor, variance, since_s, moved=0.0, range_m=1000.0):
         one = np.ones((1, 1))

@@ -95,7 +95,7 @@ class ForeignFmu(Component):
         return Reach((-math.pi, math.pi), (-0.5 * math.pi, 0.5 * math.pi), lasts_s=_LASTS_S)
 
     def offer(self, port: str) -> Any:
-        """Say what its signals are, what it detects, or pass on what the traffic says."""
+        """Offer its signals, its detections, or what the traffic offers."""
         if port == "detections":
             return self.p.wiring.detections.offer(self.p.clock_spec())
         if port == "signals":
@@ -333,7 +333,7 @@ class ForeignFmu(Component):
             states.tick = ticks[there]
             states.flights = None
             for name, output in self.p.ownship.items():
-                place, a, b = wiring.outward(name, output)
+                place, a, b = wiring.output_conversion(name, output)
                 setattr(states, name, a * numbers[there, place] + b)
             sent["states"] = states
         if self.p.manoeuvre:
@@ -344,7 +344,7 @@ class ForeignFmu(Component):
 
     def _commands(self, ticks: IntArray, numbers: FloatArray) -> Manoeuvres | None:
         """Return the commands that are new, and not to do nothing."""
-        how = [self.p.wiring.outward(*item) for item in self.p.manoeuvre.items()]
+        how = [self.p.wiring.output_conversion(*item) for item in self.p.manoeuvre.items()]
         told = np.stack([a * numbers[:, place] + b for place, a, b in how], axis=1)
         before = np.vstack([self._told[np.newaxis], told[:-1]])
         changes = [place for place, name in enumerate(self.p.manoeuvre) if name in _CHANGES]
@@ -361,7 +361,7 @@ class ForeignFmu(Component):
 
 
 class RewindableFmu(ForeignFmu):
-    """An FMU whose state can be saved: it looks ahead, and is taken back if something came."""
+    """An FMU whose state can be saved: it looks ahead, and is rewound if a message arrives."""
 
     rewindable = True
 

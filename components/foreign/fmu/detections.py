@@ -71,7 +71,7 @@ class _Column:
             variable = wiring.model.variables[output]
             if variable.kind in TEXT_KINDS:
                 raise ValueError(f"{output!r} is no number")
-            first, a, b = wiring.outward(name, output)
+            first, a, b = wiring.output_conversion(name, output)
             size = wiring.size(variable)
             if element is not None and not 0 <= element < size:
                 raise ValueError(f"{output!r} has the elements 1 to {size}")
@@ -200,7 +200,7 @@ class DetectionOutputs:
         self, tick: IntArray, scan: IntArray, numbers: FloatArray, own: FloatArray | None,
         truth: FloatArray | None, roster: Roster,
     ) -> Detections:  # fmt: skip
-        """Return the looks; none that saw nothing from where nobody knows.
+        """Return the looks; none of a look without detection whose pose is unknown.
 
         Parameters
         ----------

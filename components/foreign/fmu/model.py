@@ -189,13 +189,13 @@ def read_fmu(path: Path) -> FmuModel:
         bool(interface.canGetAndSetFMUstate), bool(interface.canBeInstantiatedOnlyOncePerProcess),
         kind == "se" or bool(interface.canHandleVariableCommunicationStepSize),
         version == 3 and kind == "cs" and bool(interface.hasEventMode),
-        _exact(step), _exact(inside),
+        _exact_step(step), _exact_step(inside),
         {v.name: _variable(v, version, everything) for v in everything if v.type != "Clock"},
         {unit.name: _scale(unit) for unit in said.unitDefinitions}, clocks, raised, terminals,
     )  # fmt: skip
 
 
-def _exact(step_s: Any) -> Fraction | None:
+def _exact_step(step_s: Any) -> Fraction | None:
     return None if step_s is None else Fraction(str(step_s))
 
 

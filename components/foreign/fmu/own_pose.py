@@ -56,7 +56,7 @@ def ownship_columns(
 
 
 def _pose_rows(message: Any, wake: Wake, moves: bool) -> FloatArray:
-    """Return what each row of a message says, (9, rows)."""
+    """Return pose and velocity of each row of a message, (9, rows)."""
     rows = len(message)
     found = np.full((len(POSE) + len(OWN_VELOCITY), rows), np.nan)
     if isinstance(message, TrafficStates):

@@ -110,7 +110,7 @@ class FmuParameters(Parameters):
     def clock_spec(self) -> ClockSpec | None:
         """Return when it communicates, if that does not follow from what arrives."""
         if self.model.kind == "se":
-            step = _common(self.wiring.instants)
+            step = _common_step(self.wiring.instants)
             return ClockSpec(1 / step) if step else None
         if self.scan_rate_hz is not None:
             return ClockSpec(self.scan_rate_hz, self.offset_s)
@@ -139,7 +139,7 @@ class FmuParameters(Parameters):
         return None
 
 
-def _common(instants: Sequence[Fraction]) -> Fraction:
+def _common_step(instants: Sequence[Fraction]) -> Fraction:
     """Return the largest step of which all instants are multiples."""
     step = Fraction(0)
     for instant in instants:

@@ -59,7 +59,7 @@ def start_value(model: FmuModel, start: Mapping[str, Any], name: str) -> StartVa
 
 
 def first_inputs(model: FmuModel, start: Mapping[str, Any], variable: Variable) -> list[float]:
-    """Return what an input has before anything comes: the scene's start value, or the FMU's own."""
+    """Return an input's first value: the scene's start value, or the FMU's own."""
     size = size_of(model, start, variable)
     if variable.name in start:
         return [float(value) for value in start_value(model, start, variable.name).values]

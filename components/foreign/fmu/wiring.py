@@ -125,8 +125,10 @@ class Wiring:
                 except ValueError as error:
                     self.wrong.append(f"{key}.{name}: {error}")
 
-    def outward(self, name: str, output: str) -> tuple[int, float, float]:
-        """Return where the numbers hold an output, and how it becomes a column: (place, a, b)."""
+    def output_conversion(self, name: str, output: str) -> tuple[int, float, float]:
+        """Return an output's index among the numbers, and scale and offset into a column: (index,
+        a, b).
+        """
         code = self.names.index(output)
         place = next(i for i, (signal, _) in enumerate(self.layout) if signal == code)
         a, b = self.model.unit_conversion(unit_of_column(name), self.model.variables[output])

@@ -1,6 +1,7 @@
 """The traffic of recorded files: which aircraft of which files, when and where, and who is own."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -19,7 +20,7 @@ from components.formats.recorded.selection import (
     with_ownship,
 )
 from components.formats.recording import Recording, Samples
-from components.formats.sample_columns import Altitude
+from components.formats.sample_columns import EPOCH_S, Altitude
 from components.formats.text_rows import TrafficFile
 from components.geometry import slant_range_m
 
@@ -54,6 +55,8 @@ class TrafficChoice:
     longest_gap_s : float, optional
     without : tuple of str
         Names or callsigns of aircraft that are left out.
+    geoid_m : float
+        How high sea level lies above the ellipsoid, where it is said.
     """
 
     ownship: str | None = None
@@ -69,6 +72,7 @@ class TrafficChoice:
     heights: tuple[float, float] = (-math.inf, math.inf)
     longest_gap_s: float | None = None
     without: tuple[str, ...] = ()
+    geoid_m: float = 0.0
 
 
 def read_traffic(paths: Sequence[Path], choice: TrafficChoice) -> TrafficFile:
@@ -77,7 +81,7 @@ def read_traffic(paths: Sequence[Path], choice: TrafficChoice) -> TrafficFile:
     TrafficFileError says all that is wrong.
     """
     names = [path.stem for path in paths]
-    each = (record(path, choice.altitude, choice.place) for path in paths)
+    each = (_record(path, choice) for path in paths)
     whole = drop_aircraft(join_recordings(zip(names, each, strict=True)), choice.without)
     start_s = _earliest(whole)
     own = {} if choice.scripted else _ownship_samples(whole, choice, start_s)
@@ -104,6 +108,18 @@ def read_traffic(paths: Sequence[Path], choice: TrafficChoice) -> TrafficFile:
     return file if math.isinf(end_s) else replace(file, end_s=end_s - begin_s)
 
 
+def _record(path: Path, choice: TrafficChoice) -> Recording:
+    """Return what a file holds, heights above sea level put above the ellipsoid."""
+    one = record(path, choice.altitude, choice.place)
+    if choice.geoid_m and one.above_sea:
+        for name in one.above_sea:
+            one.samples[name]["alt"] = one.samples[name]["alt"] + choice.geoid_m
+        said = f"{one.height}: above sea level, flown {choice.geoid_m:+g} m above the ellipsoid"
+        one.notes.harmless.append(said + " ([terrain] geoid_undulation_m)")
+        one.height = re.sub(" above mean sea level|_?msl", "", one.height, flags=re.IGNORECASE)
+    return one
+
+
 def _earliest(recording: Recording) -> float:
     return min((float(c["time"][0]) for c in recording.samples.values()), default=0.0)
 
@@ -117,7 +133,7 @@ def _ownship_samples(whole: Recording, choice: TrafficChoice, start_s: float) ->
         whole.samples = with_ownship(whole, own).samples
         called, columns = own, whole.samples[own]
     else:
-        flight = record(choice.own_file, choice.altitude, choice.place)
+        flight = _record(choice.own_file, choice)
         own = next(iter(flight.samples)) if choice.ownship is None else find_aircraft(
             flight.problems, flight, choice.ownship
         )  # fmt: skip
@@ -189,12 +205,8 @@ def _note_itself(file: TrafficFile) -> None:
             )
 
 
-#: Clocks that read more count from 1970.
-_EPOCH_S = 1e8
-
-
 def clock(time_s: float) -> str:
     """Return an instant as text for people: in UTC where the clock counts from 1970."""
-    if not _EPOCH_S < time_s < 4e9:
+    if not EPOCH_S < time_s < 4e9:
         return f"{time_s:.1f} s"
     return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d %H:%M:%S} UTC"

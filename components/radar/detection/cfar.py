@@ -26,10 +26,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
-    check_model,
     check_probability,
     check_pulses,
     check_snr,
+    check_swerling_model,
     unflatten,
 )
 from components.radar.detection.probability import required_snr
@@ -60,7 +60,7 @@ def cfar_detection_probability(
     snr))**-N`` with ``a = Pfa**(-1 / N) - 1``.
     """
     ratio = check_snr(snr)
-    name = check_model(model)
+    name = check_swerling_model(model)
     terms = _terms(*_check_arguments(reference_cells, false_alarm_probability, pulses))
     flat = np.ascontiguousarray(ratio).reshape(-1)
     with np.errstate(under="ignore"):  # far from the threshold a probability is 0
@@ -102,7 +102,7 @@ def cfar_required_snr(
             f"pd is {wanted:g}: it must be above the false alarm probability, {pfa:g}, which noise "
             "alone reaches"
         )
-    return _solve_required(wanted, count, pfa, n, check_model(model))
+    return _solve_required(wanted, count, pfa, n, check_swerling_model(model))
 
 
 def cfar_loss_db(

@@ -40,9 +40,9 @@ from numpy.typing import ArrayLike
 from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
-    check_model,
     check_not_negative,
     check_probability,
+    check_swerling_model,
     one_of,
     refuse,
     unflatten,
@@ -145,7 +145,7 @@ def clutter_detection_probability(
     clutter: a mean over 64 phases, good to 1e-14 while the weaker of the two is below 20 dB, to
     1e-8 at 25 dB and 1e-4 at 30 dB.
     """
-    name = check_model(model)
+    name = check_swerling_model(model)
     kind = one_of("clutter", clutter, KINDS)
     rises = one_of("threshold", threshold, ("noise", "adaptive")) == "adaptive"
     pfa = check_probability("false_alarm_probability", false_alarm_probability)

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
-    check_model,
     check_numbers,
     check_probability,
     check_pulses,
     check_snr,
+    check_swerling_model,
     one_of,
     refuse,
     unflatten,
@@ -141,7 +141,7 @@ def _probability(
     *,
     miss: bool,
 ) -> Any:
-    name = check_model(model)
+    name = check_swerling_model(model)
     one_of("method", method, METHODS)
     shape, ratio, groups = _group(check_snr(snr), pulses, false_alarm_probability)
     result = np.empty_like(ratio)
@@ -207,7 +207,7 @@ def required_snr(
     wanted = float(check_probability("pd", pd))
     pfa = float(check_probability("false_alarm_probability", false_alarm_probability))
     n = int(check_pulses(pulses))
-    name = check_model(model)
+    name = check_swerling_model(model)
     if wanted <= pfa:
         raise ValueError(
             f"pd is {wanted:g}: it must be above the false-alarm probability {pfa:g}, which noise "

@@ -186,6 +186,11 @@ _PAGE = """# What accuracy costs
 
 Which models may be crude without changing the answer?
 
+`dsa-des cost radar_and_camera_risk --answer nmac_risk_ratio` tells it for a study, `dsa-des cost first_light --all`
+for a scene's detections, in minutes.
+
+![Share of detections that differ against the cost of the run](images/cost_chain.png)
+
 {answers_head}
 
 ## At the answer
@@ -205,28 +210,23 @@ For a 35 GHz radar (1° grid) and a camera of 0.036° pixels (2048 x 2048 each),
 All numbers above are of one scene, the [flown encounter](#a-flown-encounter).
 
 Costs are CPU times of the block per target-scan, on one core; errors are those of single
-target-scans against the ladder's reference, whose own error is measured too. Scenes are run with
-every rung in turn, everything else fixed, on common random numbers. Made by
-`python -m docs.make.accuracy_and_cost`, from `dsa-des cost`.
+target-scans against the ladder's reference. Scenes are run with every rung in turn, on common
+random numbers. Made by `python -m docs.make.accuracy_and_cost`, from `dsa-des cost`.
 
 ## How to read the tables
 
 *First seen*: of all pairs of sensor and target, the largest change in the range of the first
-detection, and the change of its time. The radar's reference detects from the first scan on, in
-the thesis's scene (12 km) and in the flown encounter: the losses of its rungs there are lower
-bounds. *Gained, lost*: detections (sensor, target, instant) that only the rung, only the
-reference has. *Fused*: share of fused rows with two sensors or more. **Bold** rungs are on the
-front: none is both cheaper and nearer to the reference. Costs that differ by less than 10 %
-change order from run to run and are given one value.
+detection, and the change of its time. The radar's reference detects from the first scan on: the
+losses of its rungs there are lower bounds. *Gained, lost*: detections (sensor, target, instant)
+that only the rung, only the reference has. *Fused*: share of fused rows with two sensors or more.
+**Bold** rungs are on the front: none is both cheaper and nearer to the reference. Costs that
+differ by less than 10 % are given one value.
 
 The *union* of sphere, cylinder and plate is the reference of cameras: one hides the other,
-whereas the thesis's model adds them up. The plate's shape is an assumption
-(`components/optical/silhouette.py`), so is the one-dimensional projection
-(`components/optical/sensors.py`), for which the thesis gives only size, range and colour. A range
-boundary has no area: the area that is just detected at the boundary represents it. The
+whereas the thesis's model adds them up. The plate's shape is an assumption, so is the
+one-dimensional projection. Of a range boundary the area counts that is just detected there. The
 Gram-Charlier series holds for steady targets: it is run on a sampled cross-section and compared
-with the exact Pd of the same sample. Fusion is compared with the truth at each instant, which
-includes the sensors' grids.
+with the exact Pd of the same sample.
 
 ## Validity of the Earth models
 
@@ -244,7 +244,7 @@ includes the sensors' grids.
 
 {chain}
 
-![Share of detections that differ against the cost of the run](images/cost_chain.png)
+The picture [above](#what-accuracy-costs) shows them all.
 
 ## A flown encounter
 
@@ -258,11 +258,9 @@ includes the sensors' grids.
 
 `dsa-des cost tracking/architectures --block tracker --duration 20 --set blocks.eo.latency_s=0.3`:
 a radar at 1 Hz and two cameras, one of them delayed; two straight flights. Times are those of a
-tracker alone in a single run, in which a step's fixed cost dominates ([in lock
-step](performance.md#track-updates) an update is far cheaper). Errors are the distance of the
-nearest confirmed track; the last rung of each ladder is the reference, which is not the truth
-either. Two flights of 20 s show the cost of the rungs; they are too short to show which is
-better. [Discussion](tracking.md#cost-of-filters-association-and-late-looks).
+tracker alone in a single run; [in lock step](performance.md#track-updates) an update is far
+cheaper. Errors are the distance of the nearest confirmed track; the last rung of each ladder is
+the reference. [Discussion](tracking.md#cost-of-filters-association-and-late-looks).
 
 {trackers}
 """
@@ -289,7 +287,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from dsa_des.commands.cost import comparison, ladders_to_climb
     from dsa_des.costs.chain import draw_chain, run_chain
     from dsa_des.costs.climb import RungCost, climb
-    from dsa_des.costs.output import draw_costs
+    from dsa_des.costs.cost_report import draw_costs
     from dsa_des.costs.variants import Variants
 
     compare = comparison()
@@ -326,9 +324,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         encounter_says=options.encounter_says,
         trackers=_tables(third),
     )
-    page = stamped(page, "python -m docs.make.accuracy_and_cost")
+    page = stamped(shorten_repeats(page), "python -m docs.make.accuracy_and_cost")
     write_file(options.docs / "accuracy-and-cost.md", page.encode())
     return 0
+
+
+def shorten_repeats(page: str) -> str:
+    """Return a page in which notes below tables that stood before are left out, or named only."""
+    lines: list[str] = []
+    known: set[str] = set()
+    for line in page.splitlines():
+        start = line.partition(" (")[0]
+        if line.startswith("Not available here:") and start in known:
+            line = f"{start}.  "
+        elif line.startswith("The same in every run") and line in known:
+            line = f"{start}: as above."
+        elif line.startswith(("CPU: by", "Note:", "Own error of")) and line.rstrip() in known:
+            continue
+        known |= {start, line, line.rstrip()}
+        lines.append(line)
+    return "\n".join(lines) + "\n"
 
 
 def _tables(costs: Sequence[Any]) -> str:

@@ -20,7 +20,7 @@ import numpy as np
 import pyarrow as pa
 
 import dsa_des
-from components.benchmark.measure import pin
+from components.benchmark.measure import pin_to_one_processor
 from components.messages.detections import Detections
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.wake import Wake
@@ -179,7 +179,7 @@ def programs(folder: Path) -> dict[str, list[str]]:
 
 def main() -> None:
     """Measure every door, and print the rows of the table."""
-    pin()
+    pin_to_one_processor()
     fmu = next(iter(sys.argv[1:]), None)
     here = __name__ if __name__ != "__main__" else "docs.make.foreign.cost_per_call"
     alone = of_run(scene(None))

@@ -83,27 +83,21 @@ blocks.traffic.file=encounters/crossing.daa
 ```
 
 For a calibrated camera, frames with their own time stamps, and undetected targets, the same from
-Python, with a pose of both aircraft for each frame (tracks with other time stamps are
-interpolated first, as `np.interp` does; angles after `np.unwrap`). The mounting turns the
-aircraft's axes (nose, right wing, floor) into the camera's as azimuth, elevation and roll, in
-this order; the focal length and the principal point are in pixels from the upper left corner:
+Python, with a pose of both aircraft for each frame. The mounting turns the aircraft's axes (nose,
+right wing, floor) into the camera's as azimuth, elevation and roll, in this order; the focal
+length and the principal point are in pixels from the upper left corner:
 
 {flown}
 
 **Accuracy.** The rendered area is that of the union of the bodies within 0.3 %. At a noise of
 0.02 of the target's contrast the flow of targets from 4 pixels agrees with the turning line of
-sight within 0.1 pixel, also if the platform's turn moves the whole picture by 139 pixels. Noise
-and clutter reduce this accuracy ([below](#accuracy-of-the-flow)). A spot of fewer than 3 pixels
-has a position and no flow.
+sight within 0.1 pixel ([below](#accuracy-of-the-flow)). A spot of fewer than 3 pixels has a
+position and no flow.
 
 **Limitations.** Only targets are rendered: false alarms are drawn as those of `optical.eo`, and
 clutter makes none. A search for a target that is too faint finds noise instead: through 4 filters
 and 52 pixels above 3 deviations 5 times as often as in 12 independent positions, the number that
-`optical.eo` counts. This is expected: a smooth field's peaks are above a level u some u² times as
-often as a single position of each cell (Adler, 1981), 9 times at 3 deviations; pixels are coarse
-for the finest filter, which gives 3.5 times, and three coarser ones add the rest. A test compares
-it with draws of the 208 correlated values, within 99 % bounds. The background has no depth, so it
-shows no parallax.
+`optical.eo` counts, as peaks of a smooth field are (Adler, 1981). The background has no depth.
 
 ## Errors of the signature model
 
@@ -135,9 +129,8 @@ better than the Cramér-Rao bound 2 σ² (Σ ∇s ∇sᵀ)⁻¹ of the shift of 
 deviation σ in each. At a noise of 0.05 (two seeds) 95 % of flows are within
 
 {bound}
-So 0.1 pixel at that noise is beyond any method for targets below 40 pixels; the bound grows with
-the noise, and is 0.067 for the smallest at 0.02. The largest errors are of outlines with little
-information along their length: one of 0.85 pixel has a bound of 0.63 (95 %), and is not reported.
+So 0.1 pixel at that noise is beyond any method for targets below 40 pixels; the bound
+grows with the noise, and is 0.067 for the smallest at 0.02.
 
 """
 
@@ -169,10 +162,10 @@ Range, km, at which half of the looks detect a sphere of 9 m², in pixels of 0.0
 a pixel in its contrast:
 
 {ranges}
-A long, thin target stands out less than a disc of its area: a rectangle of 1 to 4 by 14 % at 10
-pixels, one of 1 to 16, or the line of `optical.projection`, by about a third. With a threshold of
-1 and no other key, half of the looks detect at 0.82 of the range at which eq. 18 gives 1 to a
-target of contrast 1, for the thesis counts no noise (`noise_equivalent_contrast = 0`).
+A long, thin target stands out less than a disc of its area: a rectangle of 1 to 4 by 14
+% at 10 pixels. With a threshold of 1 and no other key, half of the looks detect at 0.82 of the
+range at which eq. 18 gives 1 to a target of contrast 1, for the thesis counts no noise
+(`noise_equivalent_contrast = 0`).
 
 ## Calibration of the stated probability
 
@@ -182,9 +175,8 @@ all cases without clutter and smear, in bins of the Pd that the signature states
 Pd of pictures (the median over bins from 0.05 to 0.999), and {shipped:.2f} times at a noise of
 {shipped_noise:g}, that of a threshold of 1: a `contrast` reduced by this factor makes
 `optical.eo` a substitute for this camera without clutter, at its field of view. In the middle of
-a plane picture of 80° by 40° pixels are larger than their share of the field, so that a target
-covers 0.80 times as many, and filters of four sizes reach 0.92 times the SNR of the table above:
-0.74 together for a point, and 0.82 for a target of many pixels, whose noise falls with them.
+a plane picture of 80° by 40° a target covers 0.80 times as many pixels, and filters of four sizes
+reach 0.92 times the SNR of the table above.
 
 | stated Pd | detected in pictures | standard error | looks |
 |---|---|---|---|

@@ -21,7 +21,11 @@ _BEGIN, _END = "<!-- section: {} -->", "<!-- end -->"
 
 HEAD = """# Published results
 
-Published results for the whole chain beside those of our scenes and studies. Made by
+Does the whole chain give what others have published?
+
+> `dsa-des run published/degas`
+
+Each section has published results beside those of our scenes and studies. Made by
 `python -m docs.make.published` (in a working copy; with names of sections, those alone). Nothing
 was tuned to a number; each section states the choices made, its inputs, their licence, and what
 is not open. A row is *equal* if both differ by no more than stated, *inside* if the published

@@ -39,14 +39,12 @@ commands: a displayed alert reaches the pilot a second later; the pilot chooses 
 execute begins, by the least turn out and no buffer, rounded to five degrees; the next decision
 comes in the tenth second after one (6 s and 3 s, and the next sample); and the command of the
 turn is 3/8 per second (3°/s within 8°, its `reducedTurnAngle_deg`) of the turn left a second
-before. The bank is that of its point mass, by the published equations. Nothing else was set from
-the records, and each of these has its own key: `alerting.m_of_n`, and `chooses`, `goes_beyond`,
-`track_step_deg` and `eases_deg` of `operator.stochastic`.
+before. The bank is that of its point mass. Each of these has its own key: `alerting.m_of_n`, and
+`chooses`, `goes_beyond`, `track_step_deg` and `eases_deg` of `operator.stochastic`.
 
 **Inputs and licence.** The encounter's numbers and its results, from the record of the test
 (X11); the numbers of the pilot model from mit-ll/degas-pilotmodel (X11). **Not open:** nothing
-that the rows need. Other encounters of the same source can be flown in the same scene with
-`traffic.daa_file` and `traffic.csv` instead of its traffic.
+that the rows need.
 """
 
 _TRACKED = """
@@ -55,9 +53,8 @@ by DO-365's Table 2-20, whose formulas have the range in nautical miles.
 `SC228_TrackedRadarModel.m` (with `az_stddev_ft = 125*(10000 - DEGAS.nm2ft) + 250`, and likewise
 for elevation and both rates) and `SC228_TrackedActiveSurveillanceModel.m` use feet instead: the
 standard deviation across the line of sight comes out as {across_ft:,.0f} ft, where the table's
-own bound is 250 ft at 1 nmi and 1,375 ft at 10 nmi. It is an easy slip and easily corrected;
-until then these two are no reference, and we leave them out. The untracked sensors are not
-affected.
+own bound is 250 ft at 1 nmi and 1,375 ft at 10 nmi. Until that is corrected these two are no
+reference.
 """
 
 

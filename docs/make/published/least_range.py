@@ -126,18 +126,15 @@ least one is found at which the nearer of the two aircraft passes at 152.4 m. An
 as the largest root over all times) gives our flown ranges to {geometry_m:.2f} m and
 {geometry_s:.4f} s of closing, at all {number} azimuths and courses. So the remaining differences
 are in their stepping, search and counting. From the open code: they begin 190 s before the
-collision, go by 0.1 s, and a turn that they count from t begins with the state two steps before
-(arrays count from one); the bank of a step is that of its end; they take modified tau, that is
-D²/(190 s · v) less than the range. From the numbers, since the search function is not in the code
-open to us: every published range, to 5 digits, is that of an instant to which ten halvings of the
-190 s lead, to the next tenth of a second, 0.186 s apart; a turn ends before the step that would
-go beyond it, and from there both fly straight, the intruder one step ahead. Counted so
-(`stepped_least_range_m`, `as_searched_m`), geometry alone gives {stepped} of the {every:,}
-published ranges to the digit, and the others to {most_s:.2f} s. So the page shows our ranges as
-they would count them: the excess of our flights over geometry, {geometry_m:.2f} m at most, is
-added to the stepped turn before the search. *Equal* is within one step of it, {step:g} s at
-closing speed. As flown, ours differ by
-{longer_low:+.2f} to {longer_high:+.2f} s.
+collision, go by 0.1 s, and a turn that they count from t begins with the state two steps before;
+the bank of a step is that of its end; they take D²/(190 s · v) less than the range. From the
+numbers: every published range is that of an instant to which ten halvings of the 190 s lead, to
+the next tenth of a second, 0.186 s apart; a turn ends before the step that would go beyond it.
+Counted so (`stepped_least_range_m`, `as_searched_m`), geometry alone gives {stepped} of the
+{every:,} published ranges to the digit, and the others to {most_s:.2f} s. So the page shows our
+ranges as they would count them: the excess of our flights over geometry, {geometry_m:.2f} m at
+most, is added to the stepped turn before the search. *Equal* is within one step of it, {step:g} s
+at closing speed. As flown, ours differ by {longer_low:+.2f} to {longer_high:+.2f} s.
 
 Choices: turns by 90° to the better side; from behind 140° also by 30°, 45°, 60° and 75°, since
 theirs are better there than turns by 90°: an aircraft a little faster than the ownship (61 to
@@ -157,10 +154,9 @@ ranges one of their steps shorter, or longer.
 
 None of these ratios was used to infer their counting. At 175 and 185 kt the needed range is 1000
 m to within a step of theirs throughout the field of a camera of 60°, so their steps decide: for
-ranges as flown the ratios there are {exactly}. One azimuth of the grid is 0.0014, and of one at
-each of these speeds, 3.25° and 22.25°, it turns on less than 0.2 m whether it is cleared, by
-which our flights need less than geometry: they roll in through 16 pieces of steady turn. For
-geometry alone, counted in the same way, the ratios of the table are {alone}.
+ranges as flown the ratios there are {exactly}. One azimuth of the grid is 0.0014, and at each of
+these speeds one turns on less than 0.2 m. For geometry alone, counted in the same way, the ratios
+of the table are {alone}.
 
 ![Least range by azimuth; risk ratio over field of view and range](images/{figure})
 

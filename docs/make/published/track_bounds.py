@@ -137,25 +137,7 @@ def text_of(lines: Lines) -> str:
                 alike.setdefault(table(lines, tracker, sensor), []).append(f"`{tracker}`")
         for text, trackers in alike.items():
             parts.append(f"**{sensor}, {' and '.join(trackers)}**\n\n{text}")
-    failed = [
-        f"- {sensor}, `{tracker}`: {said}"
-        for tracker, sensor in sorted(known, key=lambda one: one[1])
-        if (said := failures(lines, tracker, sensor))
-    ]
-    where = "\n".join(failed) or "Nowhere."
-    return "\n\n".join([*parts, f"**Bounds not met, or not shown.**\n\n{where}", _TAIL])
-
-
-def failures(lines: Lines, tracker: str, sensor: str) -> str:
-    """Return which bounds a tracker does not meet, and at which ranges, of a sensor."""
-    found = []
-    for name, what, _, bound in BOUNDS[sensor]:
-        for kind in ("not met", "not shown"):
-            at = [r for r in RANGES_NMI
-                  if verdict(lines[tracker, sensor, f"{name}.{r}"], bound(r)) == kind]  # fmt: skip
-            if at:
-                found.append(f"{what} {kind} at {', '.join(map(str, at))} nmi")
-    return "; ".join(found)
+    return "\n\n".join([*parts, _TAIL])
 
 
 def _ranges(found: list[int]) -> str:
@@ -183,19 +165,15 @@ _TAIL = """**Choices.** The bounds are second hand: quoted in comments and const
 [mit-ll/degas-core](https://github.com/mit-ll/degas-core) (`surveillanceLib/SC228_SensorModels`,
 X11); of the radar 125 (R - 1) + 250 ft across, 100 (R - 1) + 150 ft in height, 10 (R - 1) + 50 kt
 and 280 (R - 1) + 800 ft/min. "Cross-track" is taken as across the line of sight, in the
-horizontal. The ownship's position error moves both aircraft alike and is left out; its attitude
-has errors. The encounters are of our made-up airspace (`light_aircraft.txt`), with the default
-densities. The radar acquires slow targets and those off the nose later, so that at 5 and 6 nmi
-many have no track yet.
+horizontal. The ownship's position error is left out; its attitude has errors. The encounters are
+of our made-up airspace (`light_aircraft.txt`). The radar acquires slow targets and those off the
+nose later, so that at 5 and 6 nmi many have no track yet.
 
 One key of the trackers is set, for all of them: a new track may climb at 10 m/s (1 sigma, 2,000
 ft/min: `start_climb_m_s`), whereas by default it is assumed to climb as fast as aircraft fly, 70
-m/s. That is a fact of aircraft, those of the model climb at 900 ft/min at most, and known before
-any bound; the default stays, since trackers are used for other targets too. It matters at 6 nmi,
-at which a track is some looks old and an elevation of 1 degree is 190 m. The shipped case of
-evidence does not set it: its requirements are of tracks at 3 nmi.
+m/s. Those of the model climb at 900 ft/min at most. It matters at 6 nmi, at which a track is some
+looks old and an elevation of 1 degree is 190 m.
 
-**Possible improvements.** Filters of one model treat manoeuvres as noise at all times, which
-worsens rates at close range; interacting models do so in turns only. The bearing of active
-surveillance errs by 9 degrees: at long range, positions improve only with many looks, and by
-knowing how long an error lasts."""
+**Possible improvements.** Interacting models treat manoeuvres as noise in turns only, which helps
+at close range. Active surveillance's bearings err by 9 degrees: positions improve only with many
+looks."""

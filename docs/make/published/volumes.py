@@ -199,18 +199,15 @@ relative speeds at the closest approach, of {level:.0f} ft/s over ground and {cl
 
 Level flights alone would give r h / (R H): 0.0165, 0.0082, 0.0041, 0.0027. In a gas all
 differences of height are equally likely, so of those within 1000 ft a tenth are within 100 ft.
-For aircraft of the model that an ownship at 1200 to 3000 ft meets they are not: few fly much
-higher or lower. Without any flight or draw, by the counts of altitudes in the model's file, and
-times 500 ft over the radius:
+For aircraft that an ownship at 1200 to 3000 ft meets they are not. By the counts of altitudes in
+the model's file, and times 500 ft over the radius:
 
 {layers}
 
 Of the encounters that are flown above {near:.1f} % are within 100 ft at the closest approach:
-they are weighted by relative speed, climb until then, and those that begin near each other are
-rejected, which the counts do not include. Climbs account for the rest, as entries through top and
-bottom. So rows are outside because of the distribution of altitudes, not of the counting of
-volumes: if altitudes are spread widely, as from 3000 ft up, encounters give the gas's number or
-less. Not open: the model and the ownship of the published numbers.
+they are weighted by relative speed and climb until then. Climbs account for the rest, as entries
+through top and bottom. So rows are outside because of the distribution of altitudes, not of the
+counting of volumes. Not open: the model and the ownship of the published numbers.
 """
 VOLUMES = {
     "nmac": PRESETS["nmac"],

@@ -12,7 +12,8 @@ from collections.abc import Iterable, Iterator
 
 from pydantic import BaseModel
 
-from dsa_des.commands.parameters import Row, nested_models, parameter_rows
+from dsa_des.block.parameters import nested_models
+from dsa_des.commands.parameters import Row, parameter_rows
 
 _CHANGES = " May change while a run lasts."
 #: Marks keys that may change while a run lasts.

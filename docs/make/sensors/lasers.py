@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.laser.link import (
+from components.laser.range_equation import (
     laser_power_w,
     scan_detection_probability,
     shots_on_target,

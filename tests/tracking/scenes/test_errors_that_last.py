@@ -103,7 +103,10 @@ def test_what_errors_have_in_common_is_asked_of_sensors_whose_errors_last(error)
     offers = {"eye": SensorOffer(False, 1.0, lasting={}),
               "radar": SensorOffer(False, 1.0, lasting={"elevation": error})}  # fmt: skip
     lasting = LastingErrors.of(offers, ("eye", "radar"))
-    assert lasting.lasts[[0, 1, -1]].tolist() == [False, True, False] and lasting.sensors == 0b10
+    assert (
+        lasting.is_correlated[[0, 1, -1]].tolist() == [False, True, False]
+        and lasting.sensors == 0b10
+    )
 
 
 class Silent(OpticalRangeBoundary):

@@ -160,7 +160,7 @@ class Instance:
         at = 0
         for group, _ in self.setters:
             group.values[:] = row[at : at + group.count]
-            group.go()
+            group.exchange()
             at += group.count
 
     def _exchange(
@@ -224,8 +224,9 @@ class Instance:
 
     # -- clocks --------------------------------------------------------------------------------
 
-    def _go(self, before: int, tick: int, per_s: int, raised: Any) -> bool:
-        """Step to an instant; clocks that tick on the way do so at their own; whether it got there.
+    def _step_to(self, before: int, tick: int, per_s: int, raised: Any) -> bool:
+        """Step to an instant, letting clocks tick at their own on the way; return whether it got
+        there.
 
         Those that tick at the instant itself are left to whoever gives it its inputs there.
         """
@@ -241,8 +242,8 @@ class Instance:
 
     # -- going back ----------------------------------------------------------------------------
 
-    def go_to(self, slot: int, freed: list[int]) -> None:
-        """Bring it back to a state in which it was saved; 0 is before it started."""
+    def restore_slot(self, slot: int, freed: list[int]) -> None:
+        """Restore a saved state; 0 is the one before it started."""
         if slot != self.slot:
             if slot == 0:
                 self.fmu.reset()
@@ -268,14 +269,14 @@ class Instance:
 
     def run(self, request: dict[str, Any], beat: Any) -> dict[str, Any]:
         """Go through some communication points; return what is read at each."""
-        self.go_to(request["slot"], request["freed"])
+        self.restore_slot(request["slot"], request["freed"])
         ticks, per_s, rows = request["ticks"], request["per_s"], request["inputs"]
         changed, due, count = request["changed"], request["due"], len(request["ticks"])
         numbers = np.empty((count, sum(group.count for group in self.numbers)))
         raised = np.zeros((count, len(self.spec["raised"])))
         places, at = [], 0
         for group in self.numbers:
-            places.append((group.go, group.values, slice(at, at + group.count)))
+            places.append((group.exchange, group.values, slice(at, at + group.count)))
             at += group.count
         wide = [
             (group.values, place)
@@ -305,7 +306,7 @@ class Instance:
                     self._events(None, due_now, raised[row])
                     self._leave_event_mode(tick, per_s)
             elif clocked:
-                if not self._go(self.tick, tick, per_s, raised[row]):
+                if not self._step_to(self.tick, tick, per_s, raised[row]):
                     done = row
                     break
                 now_due = [*due[row], *self.clocks.ticking(tick - 1, tick)]
@@ -322,15 +323,15 @@ class Instance:
                     self._put_inputs(rows[row])
                 self.clocks.activate(due[row], tick, per_s, raised[row])
             before, self.tick = time_s, tick
-            for go, values, place in places:
-                go()
+            for exchange, values, place in places:
+                exchange()
                 numbers[row, place] = values
             for values, place in wide:
                 for element in np.flatnonzero(np.abs(numbers[row, place]) >= _EXACT).tolist():
                     exact[row, place.start + element] = str(values[element])
             if self.texts:
                 for group in self.texts:
-                    group.go()
+                    group.exchange()
                 texts.append([word for group in self.texts for word in group.words()])
         slot = self.save() if request["save"] else self.slot
         return {

@@ -62,7 +62,7 @@ class ValueGroup:
         head = [fmu.component, self.references, c.c_size_t(len(references))]
         self._arguments = (*head, *middle, self.buffer, *tail)
 
-    def go(self) -> None:
+    def exchange(self) -> None:
         """Call the FMU on the buffer."""
         status = self._function(*self._arguments)
         if status > 1:
@@ -80,7 +80,7 @@ class ValueGroup:
                 self.buffer[place] = value.encode()
         else:
             self.buffer[:] = values
-        self.go()
+        self.exchange()
 
     def words(self) -> list[str]:
         """Return the text that was read; bytes as hexadecimal digits."""

@@ -58,14 +58,9 @@ def test_tracks_hold_where_all_bounds_are_met(beyond, shown, tmp_path):
     assert f"| radar | `tracking.ekf` | {shown} |" in text
     assert "(here 60 of radar)" in text
     assert text.count("**not met**") == (0 if beyond is None else 4 * (7 - beyond))
-    assert ("\nNowhere.\n" in text) == (beyond is None)
-    if beyond == 6:
-        assert (
-            "- radar, `tracking.ekf`: across not met at 6 nmi; in height not met at 6 nmi" in text
-        )
     found["tracking.ekf", "radar", "error_vertical_m.3"] = {
         "low": 1.0, "value": 2.0, "high": 9e9, "count": 50
     }  # fmt: skip
-    assert "in height not shown at 3 nmi" in text_of(found)
+    assert text_of(found).count("**not shown**") == text.count("**not shown**") + 1
     draw(found, tmp_path / "drawn.png")
     assert (tmp_path / "drawn.png").stat().st_size > 5000

@@ -70,7 +70,7 @@ class TurnTimes:
         taken = [[*key, self.cpu_s[key], self.runs[key]] for key in sorted(self.runs)]
         write_file(path, json.dumps({"turns": turns, "taken": taken}).encode())
 
-    def take_up(self, path: Path) -> tuple[int, int] | None:
+    def read_earlier(self, path: Path) -> tuple[int, int] | None:
         """Read what an earlier attempt kept: turns that are finished, and in all; or None."""
         try:
             content = json.loads(path.read_bytes())

@@ -13,7 +13,7 @@ from dsa_des.block.component import Context
 
 
 def seeming_look(context: Context, earth: str, look: FarthestLook) -> FarthestLook:
-    """Return what a look by a model of the Earth asks of the traffic, which goes by true ranges."""
+    """Return a look's request in true ranges, given ranges by a model of the Earth."""
     if earth == REFERENCE[0] or look.range_m == 0.0 or not math.isfinite(look.range_m):
         return look
     if _known_traffic(context) is None:
@@ -50,7 +50,7 @@ class Allowance:
     # What sensors downstream bear (see `components.messages.reach.Reach`)
     relative_range: float = math.inf
 
-    def complaint(self, bound: ErrorBound) -> str:
+    def describe_excess(self, bound: ErrorBound) -> str:
         """Say which bound is not allowed, or nothing."""
         if bound.angle_rad > self.angle_rad:
             return (
@@ -98,19 +98,19 @@ def choose(
     )
     refused: dict[str, str] = {}
     for earth, attitude in pairs:
-        bound = _worst([error_bound(earth, envelope, attitude) for envelope in envelopes])
-        complaint = allowed.complaint(bound)
+        bound = _largest_bounds([error_bound(earth, envelope, attitude) for envelope in envelopes])
+        complaint = allowed.describe_excess(bound)
         if not complaint:
             break
         # The exact attitude comes later: what it does not cure is the Earth's fault.
         refused[earth] = f"{name_of(earth, attitude)}: {complaint}"
     else:
         earth, attitude = max(earths, key=EARTH_MODELS.index), min(attitudes)
-        bound = _worst([error_bound(earth, envelope, attitude) for envelope in envelopes])
+        bound = _largest_bounds([error_bound(earth, envelope, attitude) for envelope in envelopes])
     return ModelChoice(earth, attitude, bound, tuple(refused.values()))
 
 
-def _worst(bounds: Sequence[ErrorBound]) -> ErrorBound:
+def _largest_bounds(bounds: Sequence[ErrorBound]) -> ErrorBound:
     columns = [astuple(bound) for bound in bounds] or [(0.0,) * len(fields(ErrorBound))]
     return ErrorBound(*map(max, zip(*columns, strict=True)))
 

@@ -11,7 +11,7 @@ from typing import Any
 from dsa_des.block.mark import RED
 from dsa_des.costs.climb import Comparison, RungCost, show_number
 from dsa_des.files.output_file import write_file
-from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks, tight
+from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts, plain_log_ticks
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
 from dsa_des.text.safe_text import shorten
@@ -137,7 +137,7 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
         for number, rungs in enumerate(panels):
             axes = figure.add_subplot(rows, columns, number + 1)
             drawn.append((axes, _draw_panel(axes, rungs)))
-        tight(figure)
+        fit_axes_to_texts(figure)
         for axes, labels in drawn:  # where points are is known only now
             put_labels(axes, labels)
 
@@ -163,7 +163,11 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[Label]:
         error, label = cost.error.p95, cost.rung + (" (scene)" if cost.in_scene else "")
         on_floor = not error > floor
         if on_floor:
-            label += ": error unknown" if math.isnan(error) else f": {_tiny(error)} {quantity.unit}"
+            label += (
+                ": error unknown"
+                if math.isnan(error)
+                else f": {_error_text(error)} {quantity.unit}"
+            )
         at = (cost.cpu_us_per_target_scan, floor if on_floor else error)
         colour = RED if cost.pareto else "#777777"
         axes.errorbar(
@@ -176,8 +180,8 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[Label]:
     axes.plot(*zip(*front, strict=True), color=RED, linewidth=1, zorder=2)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlim(*_wide([x for (x, _), _ in points], right=1.2))
-    axes.set_ylim(*_wide([y for (_, y), _ in points]))
+    axes.set_xlim(*_log_limits([x for (x, _), _ in points], right=1.2))
+    axes.set_ylim(*_log_limits([y for (_, y), _ in points]))
     axes.grid(True, which="major", color="#dddddd", linewidth=0.6)
     axes.set_title(
         f"{figure_text(first.block)}: {first.ladder.name}, against {first.reference}", fontsize=9
@@ -191,7 +195,7 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[Label]:
     return labels
 
 
-def _tiny(error: float) -> str:
+def _error_text(error: float) -> str:
     return f"{error:.0e}" if error else "0"
 
 
@@ -233,7 +237,7 @@ def put_labels(axes: Any, labels: Sequence[Label]) -> None:
         )  # fmt: skip
 
 
-def _wide(values: Sequence[float], right: float = 0.4) -> tuple[float, float]:
+def _log_limits(values: Sequence[float], right: float = 0.4) -> tuple[float, float]:
     """Return limits of a log axis: some room on both sides, whole decades inside."""
     low, high = math.log10(min(values)), math.log10(max(values))
     return 10.0 ** (math.floor(low) - 0.2), 10.0 ** max(high + right, math.floor(low) + 1.2)

@@ -165,11 +165,11 @@ class Silence:
         return len(self.rows)
 
     @cached_property
-    def silent(self) -> RunTicks:
-        """When they are."""
+    def silent_instants(self) -> RunTicks:
+        """The instants of silence."""
         return self.instants.take(self.rows)
 
-    def since_last_work(self, row: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
+    def silence_since_work(self, row: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
         """Return for works at some rows of the wake the silence since the work before it.
 
         It is the silent rows from the first to the second: none where the second is less. `worked`
@@ -180,15 +180,15 @@ class Silence:
         run, since = at.run[order], worked.copy()
         again = run[1:] == run[:-1]
         since[order[1:][again]] = at.tick[order[:-1][again]]
-        return self._first(at.run, since), last_of_run(self.silent, at)
+        return self._first_silent(at.run, since), last_of_run(self.silent_instants, at)
 
-    def from_last_work(self, run: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
+    def silence_after_work(self, run: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
         """Return the silent rows of some runs from their last work on."""
-        ends = next_of_run(self.silent, RunTicks(run + 1, np.zeros_like(run)))
-        return self._first(run, worked), ends - 1
+        ends = next_of_run(self.silent_instants, RunTicks(run + 1, np.zeros_like(run)))
+        return self._first_silent(run, worked), ends - 1
 
-    def _first(self, run: IntArray, worked: IntArray) -> IntArray:
-        return next_of_run(self.silent, RunTicks(run, worked + self.ticks_per_s))
+    def _first_silent(self, run: IntArray, worked: IntArray) -> IntArray:
+        return next_of_run(self.silent_instants, RunTicks(run, worked + self.ticks_per_s))
 
     def end_silent_tracks(
         self, store: TrackStore, records: KeyedTable, first: IntArray, last: IntArray
@@ -200,15 +200,17 @@ class Silence:
         """
         index = np.minimum(records.replica.searchsorted(store.replica), len(records) - 1)
         over = store.updated_tick + store.life_ticks + self.late_ticks
-        row = np.maximum(next_of_run(self.silent, RunTicks(store.replica, over + 1)), first[index])
+        row = np.maximum(
+            next_of_run(self.silent_instants, RunTicks(store.replica, over + 1)), first[index]
+        )
         due = (records.replica[index] == store.replica) & (store.status != DELETED)
         due &= row <= last[index]
         if not due.any():
             return store, []
         reported = []
         for one in np.unique(row[due]).tolist():
-            mine = np.flatnonzero(records.replica == self.silent.run[one])
-            shown = (store.replica == self.silent.run[one]) & (store.status != DELETED)
+            mine = np.flatnonzero(records.replica == self.silent_instants.run[one])
+            shown = (store.replica == self.silent_instants.run[one]) & (store.status != DELETED)
             status = np.where(due & (row == one), DELETED, store.status)
             now = store.with_columns(status=status).take(shown & ~(due & (row < one)))
             reported.append(tracks_to_report(now, records.take(mine), self.rows[[one]]))

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
-    check_model,
     check_numbers,
     check_probability,
     check_pulses,
+    check_swerling_model,
     refuse,
     unflatten,
 )
@@ -55,7 +55,7 @@ def measured_snr(
     fluctuating targets", IRE Trans. IT-6(2), 1960. A noncentral one of more than 50 dB has a normal
     amplitude.
     """
-    count, name = int(check_pulses(pulses)), check_model(model)
+    count, name = int(check_pulses(pulses)), check_swerling_model(model)
     shape, (share, mean, level) = broadcast_flat(
         tail=check_numbers("tail", tail),
         snr=check_numbers("snr", snr),

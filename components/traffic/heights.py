@@ -1,0 +1,30 @@
+"""What the altitudes of a scene or a file are: heights of either kind, or pressure altitudes."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from components.atmosphere.pressure_altitude import Air
+from dsa_des.block.component import Parameters
+
+
+class Heights(Parameters):
+    """What altitudes are that are said of flights."""
+
+    heights: Literal["geometric", "sea_level", "pressure"] = Field(
+        default="geometric",
+        description="What its altitudes are: heights above the ellipsoid; above mean sea level "
+        "(`[terrain] geoid_undulation_m`); or pressure altitudes and flight levels, which are "
+        "flown where the air of `[weather]` has these pressures at the start.",
+    )
+
+    def height_m(self, air: Air | None, altitude_m: Any) -> Any:
+        """Return altitudes as heights above the ellipsoid, in a scene's air.
+
+        None is the standard's, in which they are the same numbers.
+        """
+        if air is None or self.heights == "geometric":
+            return altitude_m
+        if self.heights == "pressure":
+            return air.height_m(altitude_m)
+        return altitude_m + air.geoid_m
