@@ -21,7 +21,7 @@ from components.geometry import (
     remainder,
     wrap_heading_rad,
 )
-from dsa_des.arrays.growing import Growing, GrowingArray
+from dsa_des.arrays.growing_arrays import Growing, GrowingArray
 from dsa_des.arrays.types import FloatArray, IntArray
 
 #: Parts east and north.
