@@ -232,10 +232,9 @@ class FlownFlights:
     @cached_property
     def steered_targets(self) -> tuple[int, ...]:
         """The targets that have got manoeuvres in any run, by their index."""
-        steered = self.fleet.manoeuvre_count.reshape(len(self.platforms), -1).any(axis=1)
-        return tuple(
-            index for index, has in zip(self.platforms[1:], steered[1:], strict=True) if has
-        )
+        count = self.fleet.manoeuvre_count.reshape(len(self.platforms), -1).sum(axis=1)
+        of_each = zip(self.platforms, count.tolist(), strict=True)
+        return tuple(index for index, many in of_each if index >= 0 and many)
 
     def seen_from(self, viewer: int) -> tuple[Fleet, Fleet]:
         """Return the viewing platform's flight and its targets' flights, without manoeuvres."""

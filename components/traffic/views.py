@@ -72,8 +72,8 @@ class View:
         """
         every, lasts_s, one_run = np.arange(self._width), self.look.lasts_s, flown.runs == 1
         if self.epochs is not None:
-            own = flown.of_platform(self.viewer)
-            state, near = self.epochs.states_and_near(own, run, time_s)
+            looking = flown.of_platform(self.viewer)
+            state, near = self.epochs.states_and_near(looking, run, time_s)
             near[:, self._steered] = True
             columns = np.flatnonzero(near.any(axis=0)) if one_run else every
             return self._own(flown, run, time_s, state), columns, near[:, columns]
