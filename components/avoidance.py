@@ -23,6 +23,7 @@ from components.messages.steering import (
     Manoeuvres,
 )
 from components.messages.tracks import Tracks
+from dsa_des.arrays.run_ticks import take_runs
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.message import Message
@@ -368,10 +369,11 @@ class TurnAway(Component):
             return None
         near = tracks.range_m <= 1000.0 * self.p.range_km
         row = tracks.row_of_entries
-        run = tracks.run[row]
-        self._rangeless = with_cases(self._rangeless, run[np.isnan(tracks.range_m)], run)
+        rangeless = np.isnan(tracks.range_m)
+        of = take_runs(tracks.run, row)
+        self._rangeless = with_cases(self._rangeless, take_runs(of, rangeless.nonzero()[0]), of)
         if self.p.without_range:
-            near |= np.isnan(tracks.range_m)
+            near |= rangeless
         manoeuvres: dict[int, Manoeuvre] = {}
         rows = np.flatnonzero(np.bincount(row[near]))
         instants = wake.ticks[rows].tolist(), wake.run[rows].tolist()

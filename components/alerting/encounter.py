@@ -253,16 +253,16 @@ def _bounds(
 ) -> Bounds:
     """Return how far relative states may be wrong: standard deviations times z-scores."""
 
-    def both(find: Callable[..., Any], *keys: str) -> FloatArray:
+    def deviations_of_both(find: Callable[..., Any], *keys: str) -> FloatArray:
         mine = [own[key][:, np.newaxis] for key in keys]
         theirs = [targets[key] for key in keys]
         return np.asarray(find(*mine) + find(*theirs))
 
     deviations = Deviations(
-        both(_longest_deviation, "s_ew_std", "s_ns_std", "s_en_std"),
-        both(np.abs, "sz_std"),
-        both(_longest_deviation, "v_ew_std", "v_ns_std", "v_en_std"),
-        both(np.abs, "vz_std"),
+        deviations_of_both(_longest_deviation, "s_ew_std", "s_ns_std", "s_en_std"),
+        deviations_of_both(np.abs, "sz_std"),
+        deviations_of_both(_longest_deviation, "v_ew_std", "v_ns_std", "v_en_std"),
+        deviations_of_both(np.abs, "vz_std"),
     )
     return margins(configuration, deviations, np.hypot(relative[0], relative[1]))
 

@@ -43,12 +43,12 @@ def marginals(
         detections, column = np.unique(detection[pairs], return_inverse=True)
         weights = np.zeros((len(tracks), len(detections)))
         weights[row, column] = weight[pairs]
-        solve = exact if len(detections) <= exact_up_to else propagate_beliefs
+        solve = exact_marginals if len(detections) <= exact_up_to else propagate_beliefs
         result[pairs] = solve(weights)[row, column]
     return result
 
 
-def exact(weights: FloatArray) -> FloatArray:
+def exact_marginals(weights: FloatArray) -> FloatArray:
     """Return exact marginals of one cluster."""
     many, count = weights.shape
     sets = 1 << count

@@ -66,7 +66,7 @@ class Air:
         return float(np.log(self.qnh_hpa / STANDARD_HPA))
 
     @cached_property
-    def _column(self) -> _Column:
+    def _column(self) -> _AirColumn:
         off_k = self.offset_k
         known = {h: c + _ZERO_C_K for h, c in self.profile_c} or {0.0: _SEA_LEVEL_K + off_k}
         heights, kelvin = np.array(sorted(known.items())).T
@@ -74,7 +74,7 @@ class Air:
         every = np.union1d(heights, [0.0, _TROPOPAUSE_M])
         outside = _standard_k(every) + np.interp(every, heights, off)
         inside = (every >= heights[0]) & (every <= heights[-1])
-        return _Column(every, np.where(inside, np.interp(every, heights, kelvin), outside))
+        return _AirColumn(every, np.where(inside, np.interp(every, heights, kelvin), outside))
 
 
 def scene_air(sections: Mapping[str, Any]) -> Air | None:
@@ -87,7 +87,7 @@ def scene_air(sections: Mapping[str, Any]) -> Air | None:
     return None if air == Air() else air
 
 
-class _Column:
+class _AirColumn:
     """Air whose temperature is known at rising heights, 0 and 11 km among them, even in between.
 
     It falls by the standard's lapse rate below the lowest, and is the same above the highest.
@@ -130,4 +130,4 @@ def _standard_k(height_m: FloatArray) -> FloatArray:
     return _SEA_LEVEL_K - _LAPSE_K_M * np.minimum(height_m, _TROPOPAUSE_M)
 
 
-_STANDARD = _Column(np.array([0.0, _TROPOPAUSE_M]), _standard_k(np.array([0.0, _TROPOPAUSE_M])))
+_STANDARD = _AirColumn(np.array([0.0, _TROPOPAUSE_M]), _standard_k(np.array([0.0, _TROPOPAUSE_M])))

@@ -70,13 +70,13 @@ def _runs_of(scene: Scene, wanted: dict[str, Any]) -> Callable[[int], Callable[[
         replicas = other_flights(count)
         run_replicas(scene, replicas[:2], wanted=wanted)
 
-        def do() -> None:
+        def run_once() -> None:
             result = run_replicas(scene, replicas, wanted=wanted)
             failed = [one.error for one in result if isinstance(one, Failed)]
             if failed:
                 raise ValueError(failed[0])
 
-        return do
+        return run_once
 
     return prepare
 
@@ -117,12 +117,12 @@ def replicas_all(count: int) -> Callable[[], object]:
     (case,) = select_cases(["monte_carlo"])
     scenes = replicas_of(scene_of(case, quick=False, sets=("record.truth=true",)), count)
 
-    def do() -> None:
+    def run_once() -> None:
         for start in range(0, count, _ALL_AT_ONCE):  # what a study would hold at a time
             part = scenes[start : start + _ALL_AT_ONCE]
             lock_step(part, recorder=Recorder([ColumnSink()])).run()
 
-    return do
+    return run_once
 
 
 def risk(count: int) -> Callable[[], object]:
@@ -151,13 +151,13 @@ def _chunks(scene: str, tables: dict[str, Any], count: int) -> Callable[[], obje
     study = study_of_tables(tables, read_scene_file(SCENES / scene), (), ())
     starts = iter(range(0, 100_000 - count, count))  # each time other encounters
 
-    def do() -> None:
+    def run_once() -> None:
         start = next(starts)
         done = run_chunk(study, Chunk("part", ((0, start, start + count),)))
         if done.failed:
             raise ValueError(f"{done.failed} runs failed")
 
-    return do
+    return run_once
 
 
 @dataclass(frozen=True)
@@ -301,20 +301,20 @@ def measure_rate(name: str, quick: bool, repeats: int) -> dict[str, Any]:
         other = prepare(quick)
         if other is not None:
             beside[name] = _per_s(*other, 1 if quick else min(repeats, 2))
-    do = rate.prepare(count)
-    per_s = _per_s(count, do, repeats)
-    shares = shares_by_block(do) if rate.by_block else {}
+    run_once = rate.prepare(count)
+    per_s = _per_s(count, run_once, repeats)
+    shares = shares_by_block(run_once) if rate.by_block else {}
     return {
         "scene": rate.name, "per_s": per_s, "wanted": rate.wanted, "beside": beside,
         "shares": shares,
     }  # fmt: skip
 
 
-def _per_s(count: int, do: Callable[[], object], repeats: int) -> float:
-    do()
+def _per_s(count: int, run_once: Callable[[], object], repeats: int) -> float:
+    run_once()
     result = []
     for _ in range(repeats):
         started = time.process_time()
-        do()
+        run_once()
         result.append(count / (time.process_time() - started))
     return median(result)

@@ -62,7 +62,7 @@ def run_benchmark(
         console.print(f"rows written to {target}")
 
 
-def fresh(kind: str, name: str, quick: bool, repeats: int) -> dict[str, Any]:
+def measure_in_new_process(kind: str, name: str, quick: bool, repeats: int) -> dict[str, Any]:
     """Return the row of one thing, measured in a process of its own."""
     # -P: no file of the working directory is imported.
     command = [sys.executable, "-P", "-m", "components.benchmark.measure", kind, name]
@@ -87,7 +87,7 @@ class _Asked:
         rows = []
         for thing in things:
             self.console.print(f"{thing.name}: {thing.what} ...", style="dim")
-            rows.append(fresh(kind, thing.name, self.quick, self.repeats))
+            rows.append(measure_in_new_process(kind, thing.name, self.quick, self.repeats))
         return rows
 
     def show(self, headings: Sequence[str], lines: Iterable[Sequence[str]], apart: int = 1) -> None:
@@ -175,7 +175,7 @@ def _rates(asked: _Asked, rates: list[Rate]) -> list[dict[str, Any]]:
 
 
 def _calls(asked: _Asked) -> list[dict[str, Any]]:
-    row = fresh("calls", "embed", asked.quick, asked.repeats)
+    row = measure_in_new_process("calls", "embed", asked.quick, asked.repeats)
     asked.console.print(f"simulate: {row['what']}; {row['calls']} calls", soft_wrap=True)
     names = {
         "wall_us": "wall time",

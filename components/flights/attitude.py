@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from components.arguments.units import STANDARD_GRAVITY_M_S2
+from components.flights.fleet import CELLS_AT_ONCE
 from components.geometry import Vector, local_axes, radii_of_curvature, wrap_heading_rad
 from dsa_des.arrays.types import FloatArray
 
@@ -38,13 +39,14 @@ def fit_path(
     alt_m: FloatArray,
     *,
     window_s: float = WINDOW_S,
+    offsets: Sequence[int] | None = None,
 ) -> tuple[Vector, Vector]:
     """Return velocity (m/s) and acceleration (m/s²) of a parabola fitted around each sample.
 
     Both are east, north and up in the sample's own frame, of one aircraft (n,) or of several that
     have the same times (n, aircraft). Samples within half of the window, and always the two
     neighbours, have equal weight; where there are fewer than three, or too clumped ones, a straight
-    line is fitted.
+    line is fitted. Of a block of a path, `offsets` are those of the whole (`blocks_of_path`).
     """
     east, north, up = local_axes(lat_deg, lon_deg)
     meridian, prime_vertical = radii_of_curvature(lat_deg)
@@ -57,7 +59,35 @@ def fit_path(
         )
 
     # The reference sample is at the origin by definition, so only displacements are summed.
-    return _fit(time_s, displacement, lat_deg.shape, degree=2, window_s=window_s)
+    offsets = _offsets(time_s, window_s) if offsets is None else offsets
+    return _fit(time_s, displacement, lat_deg.shape, offsets, degree=2, window_s=window_s)
+
+
+def blocks_of_path(
+    time_s: FloatArray,
+) -> Iterator[tuple[slice, slice, slice, Sequence[int]]]:
+    """Give blocks of a long path, for what is fitted around its samples.
+
+    Each is a block with its neighbours on either side, which rows of that are its own, which these
+    are of the path, and the offsets of `fit_path`.
+    """
+    offsets = _offsets(time_s, WINDOW_S)
+    reach, count = offsets[-1], len(time_s)
+    for first in range(0, count, CELLS_AT_ONCE):
+        end, start = min(first + CELLS_AT_ONCE, count), max(first - reach, 0)
+        inner = slice(first - start, end - start)
+        yield slice(start, end + reach), inner, slice(first, end), offsets
+
+
+def _offsets(time_s: FloatArray, window_s: float) -> Sequence[int]:
+    """Return how many samples away those are that a sample is fitted with."""
+    within_s, reach = 0.5 * window_s + _EDGE_S, 1
+    while reach < len(time_s) - 1 and np.any(
+        time_s[reach + 1 :] - time_s[: -reach - 1] <= within_s
+    ):
+        reach += 1
+    step = -(-reach // _MOST_OFFSETS)
+    return sorted({1, *range(step, reach + 1, step)})
 
 
 def attitude_from_path(
@@ -75,27 +105,34 @@ def attitude_from_path(
     the roll is the bank of a coordinated turn. Slower than 0.5 m/s the last yaw is held, and pitch
     and roll are 0.
     """
-    if velocity_enu_mps is None:
-        velocity, acceleration = fit_path(time_s, lat_deg, lon_deg, alt_m)
-    else:
-        velocity = velocity_enu_mps
-        acceleration = _slope_of_velocity(time_s, lat_deg, lon_deg, velocity)
-    v_east, v_north, v_up = velocity
-    if wind_east_north_mps != (0.0, 0.0):
-        v_east, v_north = v_east - wind_east_north_mps[0], v_north - wind_east_north_mps[1]
-    speed = np.sqrt(v_east * v_east + v_north * v_north)
-    moving = speed >= SLOWEST_TRACK_MPS
-    across = v_north * acceleration[0] - v_east * acceleration[1]
-    across = across / np.where(moving, speed, 1.0)
-    yaw = wrap_heading_rad(_hold_yaw(np.arctan2(v_east, v_north), moving))
-    pitch = np.where(moving, np.arctan2(v_up, np.where(moving, speed, 1.0)), 0.0)
-    roll = np.where(moving, np.arctan2(across, STANDARD_GRAVITY_M_S2), 0.0)
-    return yaw, pitch, roll
+    yaw, pitch, roll = (np.empty(lat_deg.shape) for _ in range(3))
+    moving = np.empty(lat_deg.shape, dtype=bool)
+    for part, inner, rows, offsets in blocks_of_path(time_s):
+        times, lat, lon = time_s[part], lat_deg[part], lon_deg[part]
+        if velocity_enu_mps is None:
+            velocity, acceleration = fit_path(times, lat, lon, alt_m[part], offsets=offsets)
+        else:
+            east, north, up = (along[part] for along in velocity_enu_mps)
+            velocity = east, north, up
+            acceleration = _slope_of_velocity(times, lat, lon, velocity, offsets)
+        v_east, v_north, v_up = velocity
+        if wind_east_north_mps != (0.0, 0.0):
+            v_east, v_north = v_east - wind_east_north_mps[0], v_north - wind_east_north_mps[1]
+        speed = np.sqrt(v_east * v_east + v_north * v_north)
+        moves = speed >= SLOWEST_TRACK_MPS
+        across = v_north * acceleration[0] - v_east * acceleration[1]
+        across = across / np.where(moves, speed, 1.0)
+        moving[rows], yaw[rows] = moves[inner], wrap_heading_rad(np.arctan2(v_east, v_north))[inner]
+        climb = np.arctan2(v_up, np.where(moves, speed, 1.0))
+        pitch[rows] = np.where(moves, climb, 0.0)[inner]
+        roll[rows] = np.where(moves, np.arctan2(across, STANDARD_GRAVITY_M_S2), 0.0)[inner]
+    return _hold_yaw(yaw, moving), pitch, roll
 
 
 def _slope_of_velocity(
-    time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray, velocity: Vector
-) -> Vector:
+    time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray, velocity: Vector,
+    offsets: Sequence[int],
+) -> Vector:  # fmt: skip
     """Fit a straight line to velocities, each turned into the sample's own frame; its slope."""
     east, north, _ = local_axes(lat_deg, lon_deg)
     x, y, z = (velocity[0] * e + velocity[1] * n for e, n in zip(east, north, strict=True))
@@ -108,13 +145,14 @@ def _slope_of_velocity(
             v_up[j] - v_up[i],
         )
 
-    return _fit(time_s, change, lat_deg.shape, degree=1)[0]
+    return _fit(time_s, change, lat_deg.shape, offsets, degree=1)[0]
 
 
 def _fit(
     time_s: FloatArray,
     difference: Callable[[slice, slice], Vector],
     shape: tuple[int, ...],
+    offsets: Sequence[int],
     degree: int,
     window_s: float = WINDOW_S,
 ) -> tuple[Vector, Vector]:
@@ -125,11 +163,6 @@ def _fit(
     """
     n = len(time_s)
     half = 0.5 * window_s
-    reach = 1
-    while reach < n - 1 and np.any(time_s[reach + 1 :] - time_s[: -reach - 1] <= half + _EDGE_S):
-        reach += 1
-    step = -(-reach // _MOST_OFFSETS)
-    offsets = sorted({1, *range(step, reach + 1, step)})
     time_s = time_s.reshape(n, *(1 for _ in shape[1:]))  # the same for all aircraft
     # Sums over the window of tau^0..tau^4, and of tau^0..tau^2 times each component.
     moments = [np.zeros_like(time_s) for _ in range(5)]

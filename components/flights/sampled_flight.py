@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.flights.attitude import attitude_from_path, fit_path
+from components.flights.attitude import attitude_from_path, blocks_of_path, fit_path
 from components.flights.fleet import (
     CELLS_AT_ONCE,
     Fleet,
@@ -108,7 +108,7 @@ class SampledTrajectory:
                 given["velocity_north_mps"],
                 given["velocity_up_mps"],
             )
-            self.velocity_was_ignored = not _is_velocity_of_path(velocity, fit_path(*path)[0])
+            self.velocity_was_ignored = not _is_velocity_of_path(velocity, *path)
             self.velocity_enu_mps = None if self.velocity_was_ignored else velocity
         #: Which of yaw, pitch and roll were derived from the path, not given.
         self.derived_attitude = tuple(
@@ -143,6 +143,8 @@ class SampledTrajectory:
                     wind_east_north_mps=wind_east_north_mps,
                 )
             )
+        if len(pieces) == 1:
+            return pieces[0]
         return tuple(np.concatenate(parts) for parts in zip(*pieces, strict=True))
 
     def __getattr__(self, name: str) -> Any:
@@ -397,16 +399,24 @@ def _mean_speed_bound(
     """Return what no mean speed between two samples exceeds, of one aircraft or of several."""
     if len(time_s) < 2:
         return np.zeros(lat_deg.shape[1:])
-    at = slice(None, -1), slice(1, None)
-    step_m = slant_range_m(*(column[rows] for rows in at for column in (lat_deg, lon_deg, alt_m)))
-    duration = np.diff(time_s).reshape(-1, *(1 for _ in lat_deg.shape[1:]))
+    fastest: list[FloatArray] = []
+    for first in range(0, len(time_s) - 1, CELLS_AT_ONCE):
+        end = min(first + CELLS_AT_ONCE, len(time_s) - 1)
+        at = slice(first, end), slice(first + 1, end + 1)
+        ends = (column[rows] for rows in at for column in (lat_deg, lon_deg, alt_m))
+        duration = np.diff(time_s[first : end + 1]).reshape(-1, *(1 for _ in lat_deg.shape[1:]))
+        fastest.append(np.max(slant_range_m(*ends) / duration, axis=0))
     # Chords are shorter than paths on the ground by far less than one per cent.
-    bound: FloatArray = 1.01 * np.max(step_m / duration, axis=0)
+    bound: FloatArray = 1.01 * np.max(fastest, axis=0)
     return bound
 
 
-def _is_velocity_of_path(measured: Vector, fitted: Vector) -> bool:
+def _is_velocity_of_path(measured: Vector, time_s: FloatArray, *place: FloatArray) -> bool:
     """Tell whether velocities are those of the path: median misfit in 5 m/s or 10 % of speed."""
-    misfit = np.sqrt(sum((m - f) ** 2 for m, f in zip(measured, fitted, strict=True)))
-    speed = np.sqrt(sum(f**2 for f in fitted))
+    misfit, speed = np.empty(len(time_s)), np.empty(len(time_s))
+    for part, inner, rows, offsets in blocks_of_path(time_s):
+        fitted, _ = fit_path(time_s[part], *(column[part] for column in place), offsets=offsets)
+        off = sum((m[part] - f) ** 2 for m, f in zip(measured, fitted, strict=True))
+        misfit[rows] = np.sqrt(off)[inner]
+        speed[rows] = np.sqrt(sum(f**2 for f in fitted))[inner]
     return len(misfit) < 2 or float(np.median(misfit)) <= max(5.0, 0.1 * float(np.median(speed)))

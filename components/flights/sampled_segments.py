@@ -53,12 +53,14 @@ _LIMITS = {
 
 
 def checked_samples(name: str, **columns: npt.ArrayLike | None) -> dict[str, FloatArray]:
-    """Return the given columns as contiguous arrays of one length."""
+    """Return the given columns as contiguous arrays of one length; what is read-only as it is."""
     checked: dict[str, FloatArray] = {}
     for column, values in columns.items():
         if values is None:
             continue
-        array = np.array(values, dtype=np.float64, order="C")
+        array = np.asarray(values, dtype=np.float64, order="C")
+        if array is values and array.flags.writeable:
+            array = array.copy()
         if array.ndim != 1 or len(array) == 0:
             raise ValueError(
                 f"{name}: {column} has shape {array.shape}: it must have one axis and at least "

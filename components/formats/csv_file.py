@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import csv
+import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from itertools import chain
 from os import PathLike
 from pathlib import Path
@@ -20,13 +21,13 @@ from components.formats.sample_columns import (
     ColumnSpec,
     SampleColumn,
     complete_velocity,
-    enu_velocity,
     in_epoch_units,
     indices_of,
     is_missing,
     name_and_unit,
     time_parser,
     unit_factor,
+    with_velocity,
 )
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import (
@@ -34,11 +35,12 @@ from components.formats.text_rows import (
     TrafficFile,
     did_you_mean,
     each_line,
+    quoted_rows,
     read_content,
     shown_columns,
     text_of,
+    without_frame,
 )
-from dsa_des.arrays.types import FloatArray
 
 _GEOMETRIC = ("geoaltitude", "altgeom", "geomaltitude", "geometricaltitude", "gnssaltitude")
 _BAROMETRIC = ("baroaltitude", "altbaro", "barometricaltitude", "pressurealtitude")
@@ -52,15 +54,19 @@ _ORDER: Mapping[Altitude | None, tuple[str, ...]] = {
 }
 _CLIMBS = (
     "vs", "vertrate", "verticalrate", "verticalspeed", "climb", "climbrate", "geomrate", "barorate",
+    "vspeed", "vertspeed",
 )  # fmt: skip
 # An address is one aircraft's, which a callsign need not be.
 _ADDRESSES = ("icao24", "icao", "hex", "hexident", "icaoaddress", "address")
 _IDENTITIES = (
-    *_ADDRESSES, "id", "name", "callsign", "aircraft", "acid", "flight", "ident",
+    *_ADDRESSES, "id", "name", "callsign", "aircraft", "acid", "flight", "ident", "flightid",
 )  # fmt: skip
 #: When positions were received: state vectors repeat one until the next comes.
 _OF_POSITIONS = ("timeposition", "lastposupdate", "lastposition")
-_CLOCKS = ("time", "timestamp", "t", "posixtime", "unixtime", "utc", "datetime")
+_CLOCKS = (
+    "time", "timestamp", "t", "posixtime", "unixtime", "utc", "datetime", "eventtime", "snapshotid",
+    "networktime",
+)  # fmt: skip
 _TIMES = (*_OF_POSITIONS, *_CLOCKS)
 _DATES = ("date", "utcdate")
 #: Latitude and longitude in one cell.
@@ -83,11 +89,20 @@ _NEEDED = frozenset(quantity for quantity, spec in COLUMNS.items() if spec.requi
 #: Whose tables have names that no one else has, and are in feet, knots and feet per minute.
 _FAMILIES = (
     ("readsb", ({"altgeom"}, {"altbaro"}, {"geomrate"}, {"barorate"})),
-    ("FlightRadar24", ({"timestamp", "utc", "callsign", "speed", "direction"},)),
+    (
+        "FlightRadar24",
+        (
+            {"timestamp", "utc", "callsign", "speed", "direction"},
+            {"snapshotid", "radarid"},
+            {"networktime", "receivertime"},
+        ),
+    ),
     ("BaseStation", ({"hexident"},)),
     # Of OpenSky's data, in Python.
     ("the library traffic", ({"icao24", "altitude", "groundspeed", "verticalrate"},)),
 )
+#: Which family writes 0 for the altitude of what is on the ground, however high that is.
+_ZERO_ON_GROUND = "FlightRadar24"
 #: Fewer different ones may be in steps of 25 by chance.
 _FEW_HEIGHTS = 5
 _OF_FAMILIES = {"alt": "ft", "alt instead": "ft", "gs": "kt", "vs": "ft/min"}
@@ -118,14 +133,14 @@ def read_csv(
         return recording_of(problems, log, ownship, altitude).flights()
     if data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
         problems.fail(UNKNOWN_JSON)
-    text = text_of(data, problems)
+    lines = each_line(text_of(data, problems))
     del data  # of many rows it is not held beside their samples
-    return record_table(problems, text, ownship, altitude).flights()
+    return record_table(problems, lines, ownship, altitude).flights()
 
 
 def record_table(
     problems: Problems,
-    text: str,
+    lines: Iterator[tuple[int, str]],
     ownship: str | None = None,
     altitude: Altitude | None = None,
     stem: str | None = None,
@@ -133,11 +148,11 @@ def record_table(
     """Return the aircraft of a table, see `read_csv`: two or more, or any, called as its `stem`
     where there is no column of names.
     """
-    (header_line, header_text), body = _header_and_rows(problems, each_line(text))
+    (header_line, header_text), body = _header_and_rows(problems, without_frame(lines))
     header_text = header_text.lstrip("#").strip(" ")
     delimiter = next((d for d in (",", ";", "\t", "|") if d in header_text), " ")
-    ((_, headers),) = _rows(iter([(header_line, header_text)]), delimiter)
-    rows = _rows((one for one in body if not one[1].startswith("#")), delimiter)
+    ((_, headers),) = quoted_rows(iter([(header_line, header_text)]), delimiter)
+    rows = quoted_rows((one for one in body if not one[1].startswith("#")), delimiter)
     return record_rows(problems, headers, header_line, rows, ownship, altitude, stem)
 
 
@@ -163,6 +178,8 @@ def record_rows(
     columns, notes = _find_columns(problems, headers, header_line, altitude)
     identity, time = columns.pop("id").index, columns["time"].index
     plain = [name_and_unit(header)[0] for header in headers]
+    is_address, is_zero_ground = plain[identity] in _ADDRESSES, _family(plain) == _ZERO_ON_GROUND
+    high = columns["alt"].index
     date = next((plain.index(name) for name in _DATES if name in plain), None)
     # Where a position's own time is not known, that of its row must do.
     other = next((plain.index(name) for name in _CLOCKS if name in plain), time)
@@ -171,13 +188,16 @@ def record_rows(
         columns["time"] = in_epoch_units(columns["time"], begins, headers[time], notes)
     table = SampleTable(
         problems, headers, identity, columns, time_parser(columns["time"]),
-        columns.keys() - _NEEDED, gaps=True, shared=plain[identity] not in _ADDRESSES,
+        columns.keys() - _NEEDED, gaps=True, shared=not is_address,
         instead={"alt": "alt instead"} if "alt instead" in columns else {},
         least=2 if stem is None else 1, repeats=plain[time] in _OF_POSITIONS,
     )  # fmt: skip
     table.notes.harmless += notes
     nameless = 0
-    for number, row in chain(ahead, rows):
+    rows = chain(ahead, rows)
+    if plain[time] == _OF_MESSAGES:
+        rows = _first_of_seconds(rows, identity, columns, table.notes.warnings)
+    for number, row in rows:
         if len(row) == at + 1 and not row[-1]:
             row.pop()  # a comma at the end
         if position is not None and len(row) == at:
@@ -189,6 +209,10 @@ def record_rows(
             row[time] = row[other]
         if is_nameless and len(row) == len(headers) - 1:
             row.append(str(stem))
+        if is_zero_ground and len(row) >= at and row[high] == "0":
+            row[high] = ""
+        if is_address and len(row) > identity:
+            row[identity] = row[identity].removeprefix("0x")
         if stem is not None and len(row) > identity and not row[identity]:
             row[identity], nameless = stem, nameless + 1
         table.add_row(number, row)
@@ -197,7 +221,7 @@ def record_rows(
     height = columns["alt"].header
     units = next((note.partition(": ")[0] for note in notes if f"{height} in " in note), "")
     recording = table.recording(
-        ownship, _with_velocity, kind=kind, units=units or "the units of its header"
+        ownship, with_velocity, kind=kind, units=units or "the units of its header"
     )
     if f"{height} in m" in units and _seem_feet(recording):
         said = "all its numbers are multiples of 25, as feet are"
@@ -205,6 +229,31 @@ def record_rows(
             f"{height} has no unit and is read in m, but {said}: {height}_ft would say so"
         )
     return recording
+
+
+#: When a message came in, of whatever receiver: with its delay, and out of order.
+_OF_MESSAGES = "networktime"
+
+
+def _first_of_seconds(
+    rows: Iterator[tuple[int, list[str]]], identity: int, columns: Mapping[str, SampleColumn],
+    warnings: list[str],
+) -> Iterator[tuple[int, list[str]]]:  # fmt: skip
+    """Give rows with a position of one name that are a second apart or more."""
+    time, lat, lon = (columns[key].index for key in ("time", "lat", "lon"))
+    parse, last, left_out = time_parser(columns["time"]), dict[str, float](), 0
+    for number, row in rows:
+        if len(row) > max(time, lat, lon, identity) and (row[lat], row[lon]) != ("0", "0"):
+            with suppress(ValueError):  # of another cell the table says what is wrong
+                now_s = parse(row[time])
+                if now_s - last.get(row[identity], -math.inf) < 1.0:
+                    left_out += 1
+                    continue
+                last[row[identity]] = now_s
+        yield number, row
+    if left_out:
+        said = "within a second of another: receivers' delays differ by as much"
+        warnings.append(f"{left_out} positions were left out that came {said}")
 
 
 #: How many rows may be without a time before the first that has one.
@@ -269,34 +318,6 @@ def _header_and_rows(
     problems.fail("the file is empty: a row of column names and rows of samples are needed")
 
 
-def _with_velocity(samples: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    return {**samples, **enu_velocity(samples)}
-
-
-def _rows(lines: Iterator[tuple[int, str]], delimiter: str) -> Iterator[tuple[int, list[str]]]:
-    """Return each row's cells and the line where it begins; a quoted cell may go over several."""
-    if delimiter == " ":
-        yield from ((number, text.split()) for number, text in lines)
-        return
-    begun: list[int] = []
-
-    def fed() -> Iterator[str]:
-        for number, text in lines:
-            begun.append(number)
-            yield text + "\n"
-
-    reader = csv.reader(fed(), delimiter=delimiter)
-    while True:
-        begun.clear()
-        try:
-            row = next(reader, None)
-        except csv.Error:  # a cell of over 131,072 characters: no row of ours
-            row = []
-        if row is None:
-            return
-        yield begun[0], [cell.strip() for cell in row]
-
-
 def _single_position(headers: list[str]) -> int | None:
     """Return the column that holds latitude and longitude, where none holds one of them alone."""
     plain = [name_and_unit(header)[0] for header in headers]
@@ -315,7 +336,7 @@ def _find_columns(
     columns: dict[str, SampleColumn] = {}
     indices = indices_of(specs, names)
     shown = shown_columns(headers, bool(indices))
-    family = next((who for who, marks in _FAMILIES if any(m <= {*names} for m in marks)), None)
+    family = _family(names)
     notes, taken = [], []
     for quantity, spec in specs.items():
         if quantity not in indices:
@@ -347,6 +368,10 @@ def _find_columns(
     for quantity in {q for parts in VELOCITIES for q in parts} - set(kept):
         columns.pop(quantity, None)
     return columns, notes
+
+
+def _family(names: Collection[str]) -> str | None:
+    return next((who for who, marks in _FAMILIES if any(m <= {*names} for m in marks)), None)
 
 
 def _specs(names: list[str], altitude: Altitude | None) -> Mapping[str, ColumnSpec]:

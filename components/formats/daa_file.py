@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import reduce
+from itertools import chain
 from operator import add, mul
 from os import PathLike
 from pathlib import Path
@@ -16,9 +17,9 @@ from components.formats.sample_columns import (
     ColumnSpec,
     SampleColumn,
     complete_velocity,
-    enu_velocity,
     indices_of,
     unit_factor,
+    with_velocity,
 )
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import (
@@ -94,12 +95,14 @@ def read_daa(
     problems = Problems(str(path))
     text = text_of(read_content(Path(path), problems), problems)
     reference = (reference_lat_deg, reference_lon_deg, reference_alt_m)
-    return record_daa(problems, text, reference).flights()
+    return record_daa(problems, each_line(text), reference).flights()
 
 
-def record_daa(problems: Problems, text: str, reference: tuple[float, float, float]) -> Recording:
+def record_daa(
+    problems: Problems, lines: Iterator[tuple[int, str]], reference: tuple[float, float, float]
+) -> Recording:
     """Return the aircraft of a `.daa` or `.xyz` file, see `read_daa`."""
-    table, columns = _table(problems, text, ("yaw",))
+    table, columns = _table(problems, lines, ("yaw",))
     notes = table.notes.harmless
     if "sx" in columns:
         notes.append(
@@ -124,24 +127,22 @@ def read_daa_samples(
     """
     problems = Problems(str(path))
     text = text_of(read_content(Path(path), problems), problems)
-    table, _ = _table(problems, text, extra)
-    return {
-        name: {**samples, **enu_velocity(samples)} for name, samples in table.samples(None).items()
-    }
+    table, _ = _table(problems, each_line(text), extra)
+    return {name: with_velocity(samples) for name, samples in table.samples(None).items()}
 
 
 def _table(
-    problems: Problems, text: str, extra: Sequence[str]
+    problems: Problems, lines: Iterator[tuple[int, str]], extra: Sequence[str]
 ) -> tuple[SampleTable, dict[str, SampleColumn]]:
     """Read a file's rows into a table of samples, not checked yet against each other."""
-    lines = [one for one in each_line(text) if not one[1].lstrip().startswith("#")]
-    if not lines:
+    lines = (one for one in lines if not one[1].lstrip().startswith("#"))
+    header_line, header_text = next(lines, (0, ""))
+    if not header_line:
         problems.fail("the file is empty: a row of column names and rows of samples are needed")
-    header_line, header_text = lines[0]
     headers = tokens(header_text)
     indices = _find_columns(problems, headers, header_line, extra)
     notes: list[str] = []
-    units, body = _find_units(problems, headers, indices, lines[1:], notes)
+    units, body = _find_units(problems, headers, indices, lines, notes)
     columns = {}
     for quantity in [*_quantities_to_read(indices), *(q for q in extra if q in indices)]:
         index = indices[quantity]
@@ -192,22 +193,22 @@ def _find_units(
     problems: Problems,
     headers: list[str],
     indices: dict[str, int],
-    lines: list[tuple[int, str]],
+    lines: Iterator[tuple[int, str]],
     notes: list[str],
-) -> tuple[dict[str, tuple[int | None, str]], list[tuple[int, str]]]:
+) -> tuple[dict[str, tuple[int | None, str]], Iterator[tuple[int, str]]]:
     """Read the row of units if there is one; returns (line, token) by quantity, and the rest."""
     assumed = {q: spec.unit for q, spec in (COLUMNS | EXTRA_COLUMNS).items() if q != "name"}
     defaults: dict[str, tuple[int | None, str]] = {q: (None, u) for q, u in assumed.items()}
-    if not lines:
+    line, text = next(lines, (0, ""))
+    if not line:
         problems.fail("there are no samples after the row of column names")
-    line, text = lines[0]
     row = tokens(text)
     bracketed = "[" in text
     known = sum(clean_token(token) in ALL_TOKENS for token in row)
     if not bracketed and known < max(2, len(row) // 2):
         used = [f"{headers[indices[q]]} [{u}]" for q, u in assumed.items() if q in indices]
         notes.append(f"there is no row of units; assumed {', '.join(used)}")
-        return defaults, lines
+        return defaults, chain([(line, text)], lines)
     if len(row) != len(headers):
         problems.fail(
             f"the row of units has {len(row)} entries: the header names {len(headers)} columns",
@@ -216,16 +217,16 @@ def _find_units(
     units: dict[str, tuple[int | None, str]] = {
         q: (line, row[indices[q]]) for q in indices if q != "name"
     }
-    return units, lines[1:]
+    return units, lines
 
 
 def _geodetic(
     samples: dict[str, FloatArray], reference: tuple[float, float, float]
 ) -> dict[str, FloatArray]:
     """Turn one aircraft's columns into geodetic positions and local velocities."""
-    velocity = enu_velocity(samples)
+    samples = with_velocity(samples)
     if "sx" not in samples:
-        return {**samples, **velocity}
+        return samples
     lat, lon, _ = enu_to_geodetic(
         samples["sx"],
         samples["sy"],
@@ -237,8 +238,9 @@ def _geodetic(
     # The file's axes are the reference point's; the aircraft's own have turned a little.
     origin = local_axes(np.array([reference[0]]), np.array([reference[1]]))
     here = local_axes(lat, lon)
-    if velocity:
-        along = [velocity[key] for key in ("ve", "vn", "vu")]
+    velocity = {}
+    if "ve" in samples:
+        along = [samples[key] for key in ("ve", "vn", "vu")]
         velocity = dict(zip(("ve", "vn", "vu"), _rotate_to_axes(along, origin, here), strict=True))
     attitude = {}
     if "yaw" in samples:

@@ -14,6 +14,7 @@ import numpy as np
 
 from components.arguments.units import FOOT_M
 from components.formats.encounter_set import NAMES, TRACKS, EncounterSet
+from components.formats.sample_columns import EPOCH_S
 from components.formats.set_file import EncounterSetError, read_set
 from components.formats.track_files import (
     Track,
@@ -204,14 +205,10 @@ def _one_aircraft(path: Path) -> EncounterSetError:
     return EncounterSetError(f"{path}: has one aircraft: an ownship and an intruder are needed")
 
 
-#: Times that are larger count from 1970, s.
-_EPOCH_S = 1e8
-
-
 def _from_their_start(tracks: list[Track]) -> list[Track]:
     """Return the tracks of an encounter, times of a clock from its start."""
     start_s = min(float(track[0][0]) for track in tracks)
-    if start_s < _EPOCH_S:
+    if start_s < EPOCH_S:
         return tracks
     return [(time_s - start_s, north, east, up) for time_s, north, east, up in tracks]
 

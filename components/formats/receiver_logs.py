@@ -4,6 +4,7 @@
   and ``trace_full_*.json``, one aircraft each. Feet, knots and feet per minute.
 - SBS-1 (BaseStation) lines ``MSG,3,...``: messages of one aircraft are joined by its address.
 - OpenSky's state vectors in JSON. Metres and m/s.
+- FlightRadar24's JSON: all that is seen (``feed.js``), and single flights. Feet, knots, ft/min.
 """
 
 import json
@@ -38,7 +39,7 @@ def log_of(problems: Problems, data: bytes) -> Log | None:
     if not head.startswith((b"{", b"[")):
         return None
     warnings: list[str] = []
-    documents = _one_by_one(json_documents(problems, data, warnings))
+    documents = json_documents(problems, data, warnings)
     first = next(documents, (1, None))
     for marks, said, units, reader in _JSON:
         if isinstance(first[1], dict) and marks <= first[1].keys():
@@ -49,65 +50,111 @@ def log_of(problems: Problems, data: bytes) -> Log | None:
     return None
 
 
-def _one_by_one(documents: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
-    """Give documents, and what lists of them hold."""
-    for number, one in documents:
-        if isinstance(one, list):
-            yield from ((number, part) for part in one)
-        else:
-            yield number, one
-
-
 UNKNOWN_JSON = (
     "is JSON of no known kind: an aircraft.json or trace_full of readsb, OpenSky's states (the "
-    "keys now and aircraft, icao and trace, or time and states), or records with the columns of a "
-    "table are needed"
+    "keys now and aircraft, icao and trace, or time and states), FlightRadar24's playback or feed, "
+    "or records with the columns of a table are needed"
 )
 
 
 def json_documents(
     problems: Problems, data: bytes, warnings: list[str]
 ) -> Iterator[tuple[int, Any]]:
-    """Give a JSON document, those of all lines, or one after another, and where they begin.
+    """Give JSON documents that stand one after another, and where they begin; of a list its parts.
 
     A last line that is cut off, of a history that is being written, is left out with a warning.
     """
     text = text_of(data, problems)
     del data  # of a long history it is not held beside its text
-    lines = each_line(text)
-    begins, line = next(lines, (1, ""))
-    try:
-        yield begins, json.loads(line)
-    except (ValueError, RecursionError):
-        yield from _over_lines(problems, text)
-        return
-    del text
-    cut: tuple[int, str] | None = None
-    for number, line in lines:
-        if cut is not None:
-            problems.fail(cut[1], line=cut[0])
-        try:
-            document = json.loads(line)
-        except (ValueError, RecursionError) as error:
-            cut = number, f"is no JSON that can be read: {error}"
-            continue
-        yield number, document
-    if cut is not None:
-        warnings.append(f"the last line, {cut[0]}, is cut off and was left out")
-
-
-def _over_lines(problems: Problems, text: str) -> Iterator[tuple[int, Any]]:
-    """Give JSON documents that go over lines, one after another."""
-    decoder, at, line = json.JSONDecoder(), 0, 1
-    while (found := re.compile(r"\S").search(text, at)) is not None:
+    at, line, number = 0, 1, 0
+    is_one_a_line = True
+    while (found := _BEGINS.search(text, at)) is not None:
         start = found.start()
         line += text.count("\n", at, start)
+        number += 1
         try:
-            document, at = decoder.raw_decode(text, start)
+            if text[start] == "[":
+                parts = _Parts(text, start)
+                yield from ((line, part) for part in parts)
+                at = parts.end
+            else:
+                document, at = _decode(text, start)
+                yield line, document
         except (ValueError, RecursionError) as error:
-            problems.fail(f"is no JSON that can be read: {error}", line=line)
-        yield line, document
-        line += text.count("\n", start, at)
+            end = text.find("\n", start)
+            is_last = number > 1 and is_one_a_line and (end < 0 or not _BEGINS.search(text, end))
+            if not is_last:
+                problems.fail(f"is no JSON that can be read: {error}", line=line)
+            warnings.append(f"the last line, {line}, is cut off and was left out")
+            return
+        over = text.count("\n", start, at)
+        is_one_a_line &= not over
+        line += over
+
+
+_DECODER, _BEGINS = json.JSONDecoder(), re.compile(r"\S")
+#: The lists of a document whose line is longer are read part by part.
+_LONG = 2**20
+
+
+class _Parts:
+    """A list that begins at a place of a text; its parts are decoded each time they are asked for.
+
+    So few are held at a time. `end` is where it ends, once all were given.
+    """
+
+    def __init__(self, text: str, start: int) -> None:
+        self._text, self._start, self.end = text, start, start
+
+    def __iter__(self) -> Iterator[Any]:
+        text, at = self._text, _skip_blanks(self._text, self._start + 1)
+        while text[at] != "]":
+            part, at = _DECODER.raw_decode(text, at)
+            yield part
+            at = _skip_blanks(text, at)
+            if text[at] == ",":
+                at = _skip_blanks(text, at + 1)
+            elif text[at] != "]":
+                raise ValueError(f"Expecting ',' delimiter: char {at}")
+        self.end = at + 1
+
+
+def _skip_blanks(text: str, at: int) -> int:
+    """Return where something stands next; ValueError where nothing does."""
+    if at < len(text) and not text[at].isspace():
+        return at
+    found = _BEGINS.search(text, at)
+    if found is None:
+        raise ValueError(f"Expecting value: char {len(text)}")
+    return found.start()
+
+
+def _decode(text: str, start: int) -> tuple[Any, int]:
+    """Return the document that begins at a place, and where it ends."""
+    end = text.find("\n", start)
+    if text[start] != "{" or (end if end >= 0 else len(text)) - start < _LONG:
+        return _DECODER.raw_decode(text, start)
+    document: dict[str, Any] = {}
+    at = _skip_blanks(text, start + 1)
+    while text[at] != "}":
+        key, at = _DECODER.raw_decode(text, at)
+        at = _skip_blanks(text, at)
+        if not isinstance(key, str) or text[at] != ":":
+            raise ValueError(f"Expecting property name and ':': char {at}")
+        at = _skip_blanks(text, at + 1)
+        if text[at] == "[":
+            parts = document[key] = _Parts(text, at)
+            for _ in parts:
+                pass
+            at = parts.end
+        else:
+            document[key], at = _DECODER.raw_decode(text, at)
+        at = _skip_blanks(text, at)
+        if text[at] == ",":
+            at = _skip_blanks(text, at + 1)
+        elif text[at] != "}":
+            raise ValueError(f"Expecting ',' delimiter: char {at}")
+    return document, at + 1
 
 
 _Reader = Callable[[Mapping[str, Any], dict[str, str]], Iterator[PositionReport]]
@@ -220,6 +267,47 @@ def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Po
         yield PositionReport(str(name), time_s, lat, lon, geometric, barometric, trk, gs, climb)
 
 
+def _of_feed(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+    """Give all aircraft of FlightRadar24's live feed, each a list by the number of its flight."""
+    for state in one.values():
+        if isinstance(state, list):
+            address, lat, lon, trk, alt, gs, _, _, _, _, time_s, _, _, _, ground, climb, called = (
+                state[:17]
+            )
+            name = str(address or called)
+            callsigns[name] = str(called)
+            yield PositionReport(
+                name, time_s, lat, lon, None, None if ground else _times(alt, FOOT_M), trk,
+                _times(gs, KNOT_M_S), _times(climb, _FPM),
+            )  # fmt: skip
+
+
+def _of_playback(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+    """Give the points of a flight that FlightRadar24 plays back, of which 0 ft is the ground."""
+    flight = one["result"]["response"]["data"]["flight"]
+    called = flight["identification"]
+    name = str(flight["aircraft"]["identification"].get("modes") or called["id"])
+    callsigns[name] = str(called["callsign"] or "")
+    for point in flight["track"]:
+        yield PositionReport(
+            name, point["timestamp"], point["latitude"], point["longitude"], None,
+            _times(point["altitude"]["feet"] or None, FOOT_M), point["heading"],
+            _times(point["speed"]["kts"], KNOT_M_S), _times(point["verticalSpeed"]["fpm"], _FPM),
+        )  # fmt: skip
+
+
+def _of_details(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+    """Give the trail of a flight among FlightRadar24's details of it, which has no climb."""
+    called = one["identification"]
+    name = str((one.get("aircraft") or {}).get("hex") or called["id"])
+    callsigns[name] = str(called["callsign"] or "")
+    for point in one["trail"]:
+        yield PositionReport(
+            name, point["ts"], point["lat"], point["lng"], None,
+            _times(point["alt"] or None, FOOT_M), point["hd"], _times(point["spd"], KNOT_M_S),
+        )  # fmt: skip
+
+
 #: By the keys that a document has: what it is called, and what reads it.
 _FEET = "ft and kt"
 _JSON: tuple[tuple[frozenset[str], str, str, _Reader], ...] = (
@@ -228,6 +316,9 @@ _JSON: tuple[tuple[frozenset[str], str, str, _Reader], ...] = (
     (frozenset({"icao", "timestamp", "trace"}), "a trace of readsb", _FEET, _of_trace),
     (frozenset({"time", "states"}), "OpenSky's states", "m and m/s", _of_states),
     (frozenset({"icao24", "path"}), "a track of OpenSky", "m", _of_path),
+    (frozenset({"full_count", "version"}), "FlightRadar24's live feed", _FEET, _of_feed),
+    (frozenset({"result", "_api"}), "FlightRadar24's playback", _FEET, _of_playback),
+    (frozenset({"identification", "trail"}), "FlightRadar24's details", _FEET, _of_details),
 )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.sampled_flight import SampledTrajectory
 from components.formats.text_rows import Problems, TrafficFile
 from components.geometry import SEMI_MAJOR_AXIS_M, unit_vectors
@@ -98,6 +99,8 @@ class Recording:
         for name in list(self.samples):
             columns = self.samples.pop(name)  # columns of many rows are not held twice
             columns["time"] = subtract_start(columns["time"], start)
+            for values in columns.values():
+                values.flags.writeable = False  # its flight has them as they are
             made.append(self._flight(name, columns, longest_gap_s))
             if (speed_mps := made[-1].max_speed_mps) > _FASTEST_MPS:
                 self.problems.add(
@@ -119,7 +122,7 @@ class Recording:
         if {"ve", "vn", "vu"} <= columns.keys():
             velocity = (columns["ve"], columns["vn"], columns["vu"])
         angles: dict[str, Any] = {
-            f"{key}_rad": np.radians(columns[key])
+            f"{key}_rad": np.radians(columns.pop(key))
             for key in ("yaw", "pitch", "roll")
             if key in columns
         }
@@ -163,7 +166,8 @@ def subtract_start(time_s: FloatArray, start_s: float) -> FloatArray:
     0.1 and a scan at 0.1 s meets the sample itself.
     """
     elapsed = time_s - start_s
-    resolution = float(np.spacing(max(abs(start_s), float(np.abs(time_s).max()))))
+    largest = max(abs(start_s), -float(time_s.min()), float(time_s.max()))
+    resolution = float(np.spacing(largest))
     decimals = min(9, math.floor(-math.log10(4.0 * resolution)))
     rounded = np.round(elapsed, decimals)
     return rounded if np.all(np.diff(rounded) > 0.0) else elapsed
@@ -181,11 +185,21 @@ def aircraft_of(time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray) ->
     Samples are in the order of time. Each belongs to the aircraft whose last place is nearest if
     one could fly from there, else to another. Samples of none that has enough are the first one's.
     """
-    place = SEMI_MAJOR_AXIS_M * unit_vectors(np.radians(lon_deg), np.radians(lat_deg))
-    steps_m = np.linalg.norm(np.diff(place, axis=0), axis=1)
     number = np.zeros(len(time_s), dtype=np.int64)
-    if not (steps_m > _FASTEST_AIRCRAFT_MPS * np.diff(time_s) + _SLACK_M).any():
+
+    def places(rows: slice) -> FloatArray:
+        return SEMI_MAJOR_AXIS_M * unit_vectors(
+            np.radians(lon_deg[rows]), np.radians(lat_deg[rows])
+        )
+
+    def is_of_several(rows: slice) -> bool:
+        steps_m = np.linalg.norm(np.diff(places(rows), axis=0), axis=1)
+        return bool((steps_m > _FASTEST_AIRCRAFT_MPS * np.diff(time_s[rows]) + _SLACK_M).any())
+
+    blocks = range(0, len(time_s), CELLS_AT_ONCE)
+    if not any(is_of_several(slice(first, first + CELLS_AT_ONCE + 1)) for first in blocks):
         return number
+    place = places(slice(None))
     last: list[tuple[float, list[float]]] = []
     for row, (now_s, here) in enumerate(zip(time_s.tolist(), place.tolist(), strict=True)):
         reached = [

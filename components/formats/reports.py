@@ -1,11 +1,10 @@
 """Reports of aircraft one by one, as receivers, trackers and autopilots log them."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from components.formats.recording import Recording
-from components.formats.sample_columns import Altitude, SampleColumn, enu_velocity
+from components.formats.sample_columns import Altitude, SampleColumn, with_velocity
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import Problems
 
@@ -83,20 +82,10 @@ def recording_of(
     table.notes.harmless.append(f"read as {log.kind}, {log.units}")
     places = [_PLACE[str(heights.get(key, key))] for key in headers]
     for number, one in log.reports:
-        table.add_numbers(number, one.name, [_number(one[place]) for place in places])
+        table.add_numbers(number, one.name, [one[place] for place in places])
     table.notes.warnings += log.warnings
     named = [name for name, callsign in log.callsigns.items() if callsign == ownship]
     own = named[0] if len(named) == 1 else ownship
     return table.recording(
-        own, lambda c: {**c, **enu_velocity(c)},
-        kind=log.kind, units=log.units, callsigns=log.callsigns,
-    )  # fmt: skip
-
-
-def _number(value: Any) -> float:
-    """Return a number; NaN for what is none, ``"ground"`` for an altitude say."""
-    if type(value) is float:
-        return value if math.isfinite(value) else math.nan
-    if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 2**62:
-        return math.nan
-    return float(value)
+        own, with_velocity, kind=log.kind, units=log.units, callsigns=log.callsigns
+    )

@@ -1,13 +1,14 @@
-"""Columns of a table of samples: names, units, clocks, and cells that say nothing."""
+"""Columns of a table of samples: names, units, clocks, cells that say nothing, and numbers."""
 
 from __future__ import annotations
 
 import math
 import re
+from array import array
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -89,21 +90,21 @@ def is_missing(cell: str) -> bool:
     return cell.strip().lower() in _MISSING
 
 
-def enu_velocity(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Give east, north, up velocity from vx vy vz or trk gs vs; nothing if neither is complete."""
-    if {"vx", "vy", "vz"} <= columns.keys():
-        return {"ve": columns["vx"], "vn": columns["vy"], "vu": columns["vz"]}
-    if {"trk", "gs", "vs"} <= columns.keys():
-        track = np.radians(columns["trk"])
-        return {
-            "ve": columns["gs"] * np.sin(track),
-            "vn": columns["gs"] * np.cos(track),
-            "vu": columns["vs"],
-        }
-    return {}
+def with_velocity(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Put east, north, up velocity in place of vx vy vz or trk gs vs, if either is complete."""
+    kinds = [[columns.pop(part, None) for part in parts] for parts in VELOCITIES]
+    for kind, (first, second, third) in enumerate(kinds):
+        if first is not None and second is not None and third is not None:
+            if kind == 1:
+                track = np.radians(first)
+                first, second = second * np.sin(track), second * np.cos(track)
+            return {**columns, "ve": first, "vn": second, "vu": third}
+    return columns
 
 
 _DAY_S, _NIGHT_S = 86400.0, 7200.0
+#: Clocks that read more count from 1970.
+EPOCH_S = 1e8
 #: A clock that counts from 1970 is beyond these numbers in ns, µs and ms, and in s never.
 _EPOCHS = ((1e17, "ns"), (1e14, "µs"), (1e11, "ms"))
 
@@ -115,7 +116,7 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
     if match:
         header, unit = match[1], match[2]
     else:
-        base, _, suffix = header.rpartition("_")
+        base, _, suffix = re.sub(r"(?<=[a-z])(?=[A-Z][a-z]*$)", "_", header).rpartition("_")
         if base and clean_token(suffix) in ALL_TOKENS:
             header, unit = base, suffix
     return re.sub(r"[\s_\-.]", "", header).lower(), unit
@@ -153,9 +154,78 @@ def time_parser(column: SampleColumn) -> Callable[[str], float]:
                 return last
             if "-" not in cell[1:] and "/" not in cell:
                 raise
-            instant = datetime.fromisoformat(cell.replace("/", "-").removesuffix(" UTC"))
+            plain = cell.replace("/", "-").replace("Z.", ".").removesuffix(" UTC")
+            instant = datetime.fromisoformat(plain)
             if instant.tzinfo is None:
                 instant = instant.replace(tzinfo=UTC)
             return instant.timestamp()
 
     return parse
+
+
+#: At most one of so many samples may be at the instant of another, or lack an optional number that
+#: the nearest sample has within so many seconds: more is no slip of a recorder.
+ONE_IN, _NEAR_S = 10, 5.0
+#: However many, they are one aircraft's by a clock of whole seconds, where no two are further apart
+#: than this.
+_OF_A_SECOND = {"lat": 0.0008, "lon": 0.0008, "alt": 50.0}
+
+
+class GrowingColumns:
+    """The samples of one aircraft as they come; a column begins with its first number."""
+
+    def __init__(self, quantities: Collection[str]) -> None:
+        self.lines = array("I")
+        self.values: dict[str, array[float]] = {}
+        self._unseen = list(enumerate(quantities))
+        self._appends: list[tuple[int, Callable[[float], None]]] = []
+
+    def add(self, line: int, numbers: Sequence[float]) -> None:
+        """Add a sample of numbers in the order of the quantities, NaN where there is none."""
+        for k, quantity in [one for one in self._unseen if numbers[one[0]] == numbers[one[0]]]:
+            self._unseen.remove((k, quantity))
+            column = self.values[quantity] = array("d", [math.nan]) * len(self.lines)
+            self._appends.append((k, column.append))
+        self.lines.append(line)
+        for k, append in self._appends:
+            append(numbers[k])
+
+
+def number_of(value: Any) -> float:
+    """Return a number; NaN for what is none, ``"ground"`` for an altitude say."""
+    if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 2**62:
+        return math.nan
+    return float(value)
+
+
+def take_rows(columns: dict[str, FloatArray], rows: Any) -> None:
+    """Keep some rows of columns, one column after the other: two are there twice at no time."""
+    for key in columns:
+        columns[key] = columns[key][rows]
+
+
+def are_of_one_second(columns: dict[str, FloatArray], at_once: Any) -> bool:
+    """Tell whether samples at one instant are near each other: the clock is coarse."""
+    return columns.keys() >= _OF_A_SECOND.keys() and all(
+        bool((np.abs(np.diff(columns[key])[at_once]) <= most).all())
+        for key, most in _OF_A_SECOND.items()
+    )
+
+
+def fill_gaps(times: FloatArray, values: FloatArray) -> FloatArray | None:
+    """Return values with those of the nearest sample in a few gaps; None where they are more."""
+    order = np.argsort(times, kind="stable")
+    known = order[~np.isnan(values[order])]
+    gaps = np.flatnonzero(np.isnan(values))
+    if len(gaps) > len(values) // ONE_IN:
+        return None
+    after = np.searchsorted(times[known], times[gaps])
+    before, after = known[np.maximum(after - 1, 0)], known[np.minimum(after, len(known) - 1)]
+    is_before = times[gaps] - times[before] <= times[after] - times[gaps]
+    is_before = (is_before & (times[before] <= times[gaps])) | (times[after] < times[gaps])
+    nearest = np.where(is_before, before, after)
+    if np.any(np.abs(times[nearest] - times[gaps]) > _NEAR_S):
+        return None
+    filled = values.copy()
+    filled[gaps] = values[nearest]
+    return filled

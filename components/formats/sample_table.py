@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from array import array
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
@@ -12,7 +11,17 @@ import numpy as np
 
 from components.arguments.units import FOOT_M
 from components.formats.recording import ReadingNotes, Recording, rename_duplicates
-from components.formats.sample_columns import SampleColumn, is_missing
+from components.formats.sample_columns import (
+    EPOCH_S,
+    ONE_IN,
+    GrowingColumns,
+    SampleColumn,
+    are_of_one_second,
+    fill_gaps,
+    is_missing,
+    number_of,
+    take_rows,
+)
 from components.formats.text_rows import MOST_OF_A_CELL, MOST_PROBLEMS, Problems, TrafficFile
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.text.safe_text import shorten
@@ -27,28 +36,20 @@ _LIMITS = {
     "sz": (-1e4, 1e6, "lie in [-10000, 1000000] metres"),
 }
 # A file in which no aircraft is seen for longer has a wrong time in it: a run would last years.
-_LONGEST_SILENCE_S = 86400.0
+# Where both times count from 1970, days without a flight are nothing odd.
+_LONGEST_SILENCE_S, _LONGEST_OF_DATES_S = 86400.0, 366 * 86400.0
 
 _SEA_LEVEL = re.compile(r"sea[ _]?level|msl", re.IGNORECASE)
 #: A pressure altitude differs by less from a height in the weather of most days.
 _FAR_APART_M = 1000 * FOOT_M
 # Samples closer than this are one instant, written twice.
 _SHORTEST_STEP_S = 1e-6
-#: At most one of so many samples may be at the instant of another, or lack an optional number that
-#: the nearest sample has within so many seconds: more is no slip of a recorder.
-_ONE_IN, _NEAR_S = 10, 5.0
+#: Who is further from 0° N 0° E at some time is not there where only zeros stand, deg.
+_NEAR_0_DEG = 1.0
 #: What a row lacks that is left out; all other needed columns are its position.
 _LACKS = {"time": "time", "alt": "height"}
 
 Converter = Callable[[dict[str, FloatArray]], dict[str, FloatArray]]
-
-
-class _Rows:
-    """The samples of one aircraft as they come."""
-
-    def __init__(self, quantities: Collection[str]) -> None:
-        self.lines = array("q")
-        self.values = {quantity: array("d") for quantity in quantities}
 
 
 class SampleTable:
@@ -87,9 +88,10 @@ class SampleTable:
         self._shared = shared
         self._instead = dict(instead or {})
         self._optional = frozenset(optional) - self._instead.keys() - {*self._instead.values()}
+        self._needed = columns.keys() - self._optional - {*self._instead.values()}
         self._problems, self._name_column, self._columns = problems, name_column, columns
         self._parse_time, self._gaps = parse_time, gaps
-        self._aircraft: dict[str, _Rows] = {}
+        self._aircraft: dict[str, GrowingColumns] = {}
         self.notes = ReadingNotes()
         self._apart: dict[str, list[tuple[float, str]]] = {}
         self._second: dict[str, list[str]] = {}
@@ -99,7 +101,7 @@ class SampleTable:
             for quantity, column in columns.items()
         ]
         used = {name_column, *(column.index for column in columns.values())}
-        if ignored := [header for i, header in enumerate(headers) if i not in used]:
+        if ignored := [one for i, one in enumerate(headers) if one and i not in used]:
             self.notes.harmless.append(f"columns ignored: {', '.join(ignored)}")
 
     def add_row(self, line: int, row: list[str] | int) -> None:
@@ -115,7 +117,7 @@ class SampleTable:
             self._problems.add("the aircraft has no name", line=line)
             return
         # An aircraft counts as named even if its row is bad: it is there, only not usable.
-        rows = self._aircraft.get(name) or self._aircraft.setdefault(name, _Rows(self._columns))
+        rows = self._rows_of(name)
         numbers: list[float] = []
         whole = True
         for quantity, index, factor, low, high in self._plan:
@@ -129,28 +131,29 @@ class SampleTable:
                 whole, value = whole and found is not None, found or 0.0
             numbers.append(value)
         if whole:
-            rows.lines.append(line)
-            for column, value in zip(rows.values.values(), numbers, strict=True):
-                column.append(value)
+            rows.add(line, numbers)
 
-    def add_numbers(self, line: int, name: str, values: Sequence[float]) -> None:
-        """Add a sample of numbers in the order of the columns, NaN where there is none."""
-        rows = self._aircraft.get(name) or self._aircraft.setdefault(name, _Rows(self._columns))
+    def add_numbers(self, line: int, name: str, values: Sequence[Any]) -> None:
+        """Add a sample of values in the order of the columns, of which some are no numbers."""
+        rows = self._rows_of(name)
         if not name:
             self._problems.add("the aircraft has no name", line=line)
             return
-        for k, ((quantity, _, _, low, high), value) in enumerate(
-            zip(self._plan, values, strict=True)
-        ):
-            if low <= value <= high or value != value:
-                continue
-            if quantity not in self._optional:
-                self._number(line, quantity, self._columns[quantity], repr(value))
-                return
-            values = [*values[:k], math.nan, *values[k + 1 :]]
-        rows.lines.append(line)
-        for column, value in zip(rows.values.values(), values, strict=True):
-            column.append(value)
+        numbers: list[float] = []
+        for (quantity, _, _, low, high), value in zip(self._plan, values, strict=True):
+            number = value if type(value) is float else number_of(value)
+            if not low <= number <= high:
+                if quantity not in self._optional and math.isfinite(number):
+                    self._number(line, quantity, self._columns[quantity], repr(number))
+                    return
+                number = math.nan
+            numbers.append(number)
+        rows.add(line, numbers)
+
+    def _rows_of(self, name: str) -> GrowingColumns:
+        if name not in self._aircraft:
+            self._aircraft[name] = GrowingColumns(self._columns)
+        return self._aircraft[name]
 
     def _unusual(self, line: int, quantity: str, cell: str) -> float | None:
         """Return what a cell means that is no plain number: NaN for none, None for a problem."""
@@ -213,8 +216,8 @@ class SampleTable:
                 f"{', '.join(shorten(name) for name in names[:MOST_PROBLEMS])}"
                 f"{', …' if len(names) > MOST_PROBLEMS else ''}"
             )
-        samples = {name: self._sort_by_time(name, *rows) for name, rows in kept.items()}
         self._refuse_long_silence(kept)
+        samples = {name: self._sort_by_time(name, *kept.pop(name)) for name in names}
         self._problems.raise_if_any()
         return {own: samples.pop(own), **samples}
 
@@ -227,37 +230,54 @@ class SampleTable:
             lines = np.asarray(rows.lines)
             columns = {key: np.asarray(values) for key, values in rows.values.items()}
             rows.values.clear()  # those of many rows are not held beside what is kept of them
+            if not len(lines):  # all its rows were bad, which has been noted row by row
+                kept[name] = lines, dict.fromkeys(self._columns, np.empty(0))
+                continue
             for key, other in self._instead.items():
-                columns[key] = self._first_or_second(name, key, columns[key], columns.pop(other))
+                one = self._first_or_second(
+                    name, key, columns.pop(key, None), columns.pop(other, None)
+                )
+                columns |= {} if one is None else {key: one}
             there = np.ones(len(lines), dtype=bool)
-            for key in columns.keys() - self._optional:
-                if (lacks := np.isnan(columns[key])).any():
+            for key in self._needed:
+                lacks = np.isnan(columns[key]) if key in columns else np.True_
+                if lacks.any():
                     self._lacks[_LACKS.get(key, "position")] = 1
                     there &= ~lacks
-            left_out += int(np.count_nonzero(~there))
+            if self._gaps and {"lat", "lon"} <= columns.keys():
+                # Many write zeros where no position is known.
+                nowhere = (columns["lat"] == 0.0) & (columns["lon"] == 0.0)
+                if (
+                    nowhere.any()
+                    and np.nanmax(np.hypot(columns["lat"], columns["lon"])) > _NEAR_0_DEG
+                ):
+                    self._lacks["position"] = 1
+                    there &= ~nowhere
             if not there.all():
+                left_out += int(np.count_nonzero(~there))
                 lines = lines[there]
-                columns = {key: values[there] for key, values in columns.items()}
-            if len(lines) == 0 and not there.all():
-                absent += 1
-                continue
-            for key in sorted(self._optional & columns.keys()):
-                if missing := int(np.count_nonzero(np.isnan(columns[key]))):
-                    if missing == len(lines) and key in self._seldom:
-                        del columns[key]
-                        continue
-                    filled = _filled(columns["time"], columns[key])
+                take_rows(columns, there)
+                if not len(lines):
+                    absent += 1
+                    continue
+            for key in sorted(self._optional & self._columns.keys()):
+                column = columns.pop(key, None)
+                missing = len(lines) if column is None else int(np.count_nonzero(np.isnan(column)))
+                filled = (
+                    column if column is None or not missing else fill_gaps(columns["time"], column)
+                )
+                if filled is not None:
+                    columns[key] = filled
+                if missing and not (missing == len(lines) and key in self._seldom):
                     self.notes.note_aircraft(
                         name, f"gaps in {self._columns[key].header}",
                         f"column {self._columns[key].header} has no number in {missing} of its "
-                        f"{len(columns[key])} samples and is ignored" if filled is None else
-                        f"column {self._columns[key].header} has no number in {missing} of its "
-                        f"{len(columns[key])} samples: that of the nearest one is taken",
-                        harmless=filled is not None or missing == len(columns[key]),
+                        f"{len(lines)} samples" + (
+                            " and is ignored" if filled is None
+                            else ": that of the nearest one is taken"
+                        ),
+                        harmless=filled is not None or missing == len(lines),
                     )  # fmt: skip
-                    del columns[key]
-                    if filled is not None:
-                        columns[key] = filled
             kept[name] = lines, columns
         self._kept = len(kept)
         self._second = {
@@ -276,14 +296,14 @@ class SampleTable:
         return between.join(f"no {kind}" for kind in kinds if kind in self._lacks)
 
     def _first_or_second(
-        self, name: str, key: str, first: FloatArray, second: FloatArray
-    ) -> FloatArray:
+        self, name: str, key: str, first: FloatArray | None, second: FloatArray | None
+    ) -> FloatArray | None:
         """Return an aircraft's first column, or its second where it has nothing in the first."""
-        both = ~np.isnan(first) & ~np.isnan(second)
-        if both.any():
-            apart = float(np.abs(first - second)[both].max())
-            self._apart.setdefault(key, []).append((apart, name))
-        if np.isnan(first).all() and not np.isnan(second).all():
+        if first is not None and second is not None:
+            apart = np.abs(first - second)
+            if not np.isnan(apart).all():
+                self._apart.setdefault(key, []).append((float(np.nanmax(apart)), name))
+        elif second is not None:
             self._second.setdefault(key, []).append(name)
             return second
         return first
@@ -348,10 +368,9 @@ class SampleTable:
     ) -> dict[str, FloatArray]:
         """Put an aircraft's samples in the order of time; two places at one time are a problem."""
         if not len(lines):
-            # All its rows were bad, which has been noted row by row.
             return {}
-        order = np.argsort(columns["time"], kind="stable")
-        if np.any(order[1:] < order[:-1]):
+        if np.any(columns["time"][1:] < columns["time"][:-1]):
+            order = np.argsort(columns["time"], kind="stable")
             self.notes.note_aircraft(
                 name,
                 "order",
@@ -359,7 +378,7 @@ class SampleTable:
                 harmless=True,
             )
             lines = lines[order]
-            columns = {key: values[order] for key, values in columns.items()}
+            take_rows(columns, order)
         apart = self._optional | ({"alt"} if self._repeats else frozenset())
         where = [values for key, values in columns.items() if key not in apart]
         again = np.all([values[1:] == values[:-1] for values in where], axis=0) & self._gaps
@@ -368,14 +387,17 @@ class SampleTable:
             said = f"{count} of its samples stand there again and count once"
             self.notes.note_aircraft(name, "again", said, harmless=self._repeats)
             once = np.concatenate([[True], ~again])
-            lines, columns = lines[once], {key: values[once] for key, values in columns.items()}
+            lines = lines[once]
+            take_rows(columns, once)
         times, header = columns["time"], self._columns["time"].header
         at_once = np.diff(times) < _SHORTEST_STEP_S
-        if self._gaps and 0 < (count := int(np.count_nonzero(at_once))) <= len(times) // _ONE_IN:
+        count = int(np.count_nonzero(at_once))
+        is_slip = count <= len(times) // ONE_IN or are_of_one_second(columns, at_once)
+        if self._gaps and count and is_slip:
             said = f"several samples at one instant, {count} times: the last one counts"
             self.notes.note_aircraft(name, "at once", said)
-            last = np.append(~at_once, True)
-            return {key: values[last] for key, values in columns.items()}
+            take_rows(columns, np.append(~at_once, True))
+            return columns
         for i in np.flatnonzero(at_once):
             of = f"{self._problems.of} {lines[i]}"
             what = f"{name} already has a sample at {times[i]:.15g} s, in {of}: "
@@ -389,41 +411,25 @@ class SampleTable:
     def _refuse_long_silence(
         self, kept: Mapping[str, tuple[IntArray, dict[str, FloatArray]]]
     ) -> None:
-        """Note times after which the whole file falls silent for more than a day."""
-        if not any(len(lines) for lines, _ in kept.values()):
-            return
-        times = np.concatenate([columns["time"] for lines, columns in kept.values() if len(lines)])
-        lines = np.concatenate([lines for lines, _ in kept.values() if len(lines)])
-        order = np.lexsort((lines, times))
-        times, lines = times[order], lines[order]
+        """Note times after which the whole file falls silent for too long."""
+        times = np.concatenate([columns["time"] for _, columns in kept.values()])
+        times.sort()
         for i in np.flatnonzero(np.diff(times) > _LONGEST_SILENCE_S):
+            before_s, after_s = times[i : i + 2].tolist()
+            if before_s > EPOCH_S and after_s - before_s <= _LONGEST_OF_DATES_S:
+                continue
+            last, first = (
+                np.concatenate([lines[c["time"] == time_s] for lines, c in kept.values()])
+                for time_s in (before_s, after_s)
+            )
             self._problems.add(
-                f"the time is {times[i + 1]:.15g} s, and the one before it, in "
-                f"{self._problems.of} {lines[i]}, is {times[i]:.15g} s: the file may not be "
-                f"without a sample for more than {_LONGEST_SILENCE_S:g} s (flights of several days "
-                "need a file each)",
-                line=int(lines[i + 1]),
+                f"the time is {after_s:.15g} s, and the one before it, in "
+                f"{self._problems.of} {last.max()}, is {before_s:.15g} s: the file may not be "
+                f"without a sample for more than {_LONGEST_SILENCE_S:g} s, where it says dates "
+                f"{_LONGEST_OF_DATES_S / _LONGEST_SILENCE_S:g} days",
+                line=int(first.min()),
                 column=self._columns["time"].header,
             )
-
-
-def _filled(times: FloatArray, values: FloatArray) -> FloatArray | None:
-    """Return values with those of the nearest sample in a few gaps; None where they are more."""
-    order = np.argsort(times, kind="stable")
-    known = order[~np.isnan(values[order])]
-    gaps = np.flatnonzero(np.isnan(values))
-    if len(gaps) > len(values) // _ONE_IN:
-        return None
-    after = np.searchsorted(times[known], times[gaps])
-    before, after = known[np.maximum(after - 1, 0)], known[np.minimum(after, len(known) - 1)]
-    is_before = times[gaps] - times[before] <= times[after] - times[gaps]
-    is_before = (is_before & (times[before] <= times[gaps])) | (times[after] < times[gaps])
-    nearest = np.where(is_before, before, after)
-    if np.any(np.abs(times[nearest] - times[gaps]) > _NEAR_S):
-        return None
-    filled = values.copy()
-    filled[gaps] = values[nearest]
-    return filled
 
 
 def _limits(quantity: str) -> tuple[float, float, str]:

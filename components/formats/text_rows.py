@@ -9,6 +9,7 @@ import re
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import chain, islice
 from pathlib import Path
 from typing import NoReturn
 
@@ -24,67 +25,29 @@ from dsa_des.files.input_files import (
 )
 from dsa_des.text.safe_text import shorten
 
-LENGTH_M = {
-    "m": 1.0,
-    "metre": 1.0,
-    "metres": 1.0,
-    "meter": 1.0,
-    "meters": 1.0,
-    "km": 1000.0,
-    "cm": 0.01,
-    "mm": 0.001,
-    "ft": FOOT_M,
-    "foot": FOOT_M,
-    "feet": FOOT_M,
-    "nmi": NAUTICAL_MILE_M,
-    "nm": NAUTICAL_MILE_M,
-}
-SPEED_MPS = {
-    "m/s": 1.0,
-    "mps": 1.0,
-    "km/h": 1.0 / 3.6,
-    "kph": 1.0 / 3.6,
-    "kmh": 1.0 / 3.6,
-    "knot": NAUTICAL_MILE_M / 3600.0,
-    "knots": NAUTICAL_MILE_M / 3600.0,
-    "kn": NAUTICAL_MILE_M / 3600.0,
-    "kt": NAUTICAL_MILE_M / 3600.0,
-    "kts": NAUTICAL_MILE_M / 3600.0,
-    "mph": 1609.344 / 3600.0,
-    "mi/h": 1609.344 / 3600.0,
-    "cm/s": 0.01,
-    "nmi/h": NAUTICAL_MILE_M / 3600.0,
-    "nmi/s": NAUTICAL_MILE_M,
-    "fpm": FOOT_M / 60.0,
-    "ft/min": FOOT_M / 60.0,
-    "ft/s": FOOT_M,
-    "fps": FOOT_M,
-}
-ANGLE_DEG = {
-    "deg": 1.0,
-    "degree": 1.0,
-    "degrees": 1.0,
-    "rad": 180.0 / math.pi,
-    "radian": 180.0 / math.pi,
-    "radians": 180.0 / math.pi,
-    "1e-7deg": 1e-7,
-    "dege7": 1e-7,
-}
-TIME_S = {
-    "s": 1.0,
-    "sec": 1.0,
-    "second": 1.0,
-    "seconds": 1.0,
-    "ms": 1e-3,
-    "millisecond": 1e-3,
-    "milliseconds": 1e-3,
-    "us": 1e-6,
-    "µs": 1e-6,
-    "ns": 1e-9,
-    "min": 60.0,
-    "h": 3600.0,
-    "hr": 3600.0,
-}
+
+def _named(*units: tuple[str, float]) -> dict[str, float]:
+    """Return what units are worth by each of their names."""
+    return {name: worth for names, worth in units for name in names.split()}
+
+
+LENGTH_M = _named(
+    ("m metre metres meter meters", 1.0), ("km", 1000.0), ("cm", 0.01), ("mm", 0.001),
+    ("ft foot feet", FOOT_M), ("nmi nm", NAUTICAL_MILE_M),
+)  # fmt: skip
+SPEED_MPS = _named(
+    ("m/s mps", 1.0), ("km/h kph kmh", 1.0 / 3.6),
+    ("knot knots kn kt kts", NAUTICAL_MILE_M / 3600.0), ("mph mi/h", 1609.344 / 3600.0),
+    ("cm/s", 0.01), ("nmi/h", NAUTICAL_MILE_M / 3600.0), ("nmi/s", NAUTICAL_MILE_M),
+    ("fpm ft/min", FOOT_M / 60.0), ("ft/s fps", FOOT_M),
+)  # fmt: skip
+ANGLE_DEG = _named(
+    ("deg degree degrees", 1.0), ("rad radian radians", 180.0 / math.pi), ("1e-7deg dege7", 1e-7)
+)
+TIME_S = _named(
+    ("s sec second seconds", 1.0), ("ms millisecond milliseconds", 1e-3), ("us µs", 1e-6),
+    ("ns", 1e-9), ("min", 60.0), ("h hr", 3600.0),
+)  # fmt: skip
 NO_UNIT = {"none": 1.0, "unitless": 1.0, "": 1.0, "-": 1.0, "1": 1.0}
 
 #: In m, m/s, deg and s.
@@ -214,9 +177,14 @@ def read_lines(
 ) -> list[tuple[int, str]]:
     """Return a file's lines that hold something but comments, with their numbers from 1.
 
-    `needed` and `holds` are for the messages of a binary and of an empty file.
+    `needed` and `holds` are for the messages of a binary and of an empty file. Text may be as
+    `text_of` says; lines may end in LF, CR LF or CR.
     """
-    return lines_of(read_content(path, problems), problems, needed, holds)
+    lines = each_line(text_of(read_content(path, problems), problems, needed))
+    rows = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    if not rows:
+        problems.fail(f"the file is empty: {holds} are needed")
+    return rows
 
 
 def read_content(path: Path, problems: Problems) -> bytes:
@@ -243,21 +211,6 @@ def read_content(path: Path, problems: Problems) -> bytes:
         )
         problems.fail(f"the packed file {larger or 'is cut off'}")
     return content
-
-
-def lines_of(
-    data: bytes, problems: Problems, needed: str = _TRAFFIC, holds: str = _ROWS, *,
-    comments: bool = False,
-) -> list[tuple[int, str]]:  # fmt: skip
-    """Return the lines that hold something, but `comments` on request, numbered from 1.
-
-    Text may be as `text_of` says; lines may end in LF, CR LF or CR.
-    """
-    kept = list(each_line(text_of(data, problems, needed)))
-    rows = [(n, line) for n, line in kept if not line.lstrip().startswith("#")]
-    if not rows:
-        problems.fail(f"the file is empty: {holds} are needed")
-    return kept if comments else rows
 
 
 def text_of(data: bytes, problems: Problems, needed: str = _TRAFFIC) -> str:
@@ -331,6 +284,49 @@ def cells(line: str, count: int, name_column: int) -> list[str] | int:
         if len(split) == count:
             return split
     return len([part for part in re.split(r"[,;\s]+", line) if part])
+
+
+#: A line of the frame of a table, and how far from the first line one must be.
+_FRAME, _HEAD = re.compile(r"[+|]?-[-+]+-[+|]?"), 30
+
+
+def without_frame(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    """Give the rows of a table that a shell drew (Impala's, Trino's), its names once."""
+    head = list(islice(lines, _HEAD))
+    names = ""
+    if not any(_FRAME.fullmatch(text) for _, text in head):
+        yield from chain(head, lines)
+        return
+    for number, text in chain(head, lines):
+        if "|" in text and not _FRAME.fullmatch(text) and text != names:
+            names = names or text
+            yield number, text.strip("|")
+
+
+def quoted_rows(
+    lines: Iterator[tuple[int, str]], delimiter: str
+) -> Iterator[tuple[int, list[str]]]:
+    """Return each row's cells and the line where it begins; a quoted cell may go over several."""
+    if delimiter == " ":
+        yield from ((number, text.split()) for number, text in lines)
+        return
+    begun: list[int] = []
+
+    def fed() -> Iterator[str]:
+        for number, text in lines:
+            begun.append(number)
+            yield text + "\n"
+
+    reader = csv.reader(fed(), delimiter=delimiter)
+    while True:
+        begun.clear()
+        try:
+            row = next(reader, None)
+        except csv.Error:  # a cell of over 131,072 characters: no row of ours
+            row = []
+        if row is None:
+            return
+        yield begun[0], [cell.strip() for cell in row]
 
 
 def csv_table(

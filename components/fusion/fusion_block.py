@@ -15,7 +15,7 @@ from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.navigation.errors import navigation_errs
 from components.sensor.marks import FUSION
-from dsa_des.arrays.run_ticks import RunTicks, ranks
+from dsa_des.arrays.run_ticks import RunTicks, ranks, take_runs
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Producer
 from dsa_des.block.ladder import Verified
@@ -153,8 +153,8 @@ class Fusion(Component):
         """
         fused, parts = self._fused_message(instants, row, target, arrivals, entries)
         if len(self.sensors) > 1:
-            of_two = has_two_bits(fused.contributors)
-            self._tries = self._tries.add_tries(instants.run[row], fused.contributors, of_two)
+            run, of_two = take_runs(instants.run, row), has_two_bits(fused.contributors)
+            self._tries = self._tries.add_tries(run, fused.contributors, of_two)
         if self._says_what_is_new:
             fused.measurements = self._new(fused, parts, instants, arrivals, entries)
         return fused

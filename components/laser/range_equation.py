@@ -120,10 +120,13 @@ def scan_detection_probability(
     one = detection_probability(ratio, threshold, 1.0)
     whole = np.floor(mean)
 
-    def enough(count: Any) -> Any:
+    def probability_of_enough(count: Any) -> Any:
         possible = count >= needed
         tried = bdtrc(needed - 1, np.where(possible, count, needed).astype(np.int64), one)
         return np.where(possible, tried, 0.0)
 
     more = mean - whole
-    return unflatten((1.0 - more) * enough(whole) + more * enough(whole + 1.0), shape)
+    return unflatten(
+        (1.0 - more) * probability_of_enough(whole) + more * probability_of_enough(whole + 1.0),
+        shape,
+    )

@@ -258,12 +258,12 @@ def mean_states(
     here, _ = flight.states(time_s)
     origin = position_of(here)
 
-    def apart(at_s: FloatArray) -> FloatArray:
+    def separation_vectors(at_s: FloatArray) -> FloatArray:
         mine, theirs = map(position_of, flight.states(at_s))
         own, other = (north_east_up(*origin, *position) for position in (mine, theirs))
         return np.stack([own[1] - other[1], own[0] - other[0], mine[2] - theirs[2]])
 
-    now = apart(time_s)
+    now = separation_vectors(time_s)
     lasts_s = np.where(after > before, after - before, 1.0)
-    rate = (apart(after) - apart(before)) / lasts_s
+    rate = (separation_vectors(after) - separation_vectors(before)) / lasts_s
     return (*now, *rate)

@@ -16,6 +16,7 @@ from components.sensor.marks import TRACKER
 from components.tracking.reported_errors import folded_ranges, unknown_latency
 from dsa_des.arrays.entries import cells_of
 from dsa_des.arrays.keyed_table import KeyedTable
+from dsa_des.arrays.run_ticks import take_runs
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.message import Message, offsets_of
@@ -138,7 +139,7 @@ class TrackerStub(Component):
         if fused is None:
             return None, counts
         if busy is not None and len(fused.target):
-            run = busy.run[fused.row_of_entries]
+            run = take_runs(busy.run, fused.row_of_entries)
             self._tries = self._tries.add_tries(run, np.ones_like(run), fused.target >= 0)
         fused = true_entries(fused)
         if self.p.drop_after_s is not None:

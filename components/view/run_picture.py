@@ -85,7 +85,7 @@ def _picture_of(
     def plain(table: str, *columns: str) -> dict[str, AnyArray]:
         return {name: run.values(table, name) for name in columns if run.has(table, name)}
 
-    def about(table: str) -> dict[str, AnyArray]:
+    def base_columns(table: str) -> dict[str, AnyArray]:
         result = {"target": _codes(run.texts(table, "target"), targets)}
         return result | _sources(run, table)
 
@@ -109,7 +109,7 @@ def _picture_of(
         if run.has(name, "azimuth_rad"):
             time_s = run.numbers(name, "time_s")
             tables[name] = {
-                **about(name),
+                **base_columns(name),
                 **plain(name, "age_s"),
                 "time_s": time_s,
                 **_lines_of_sight(run, name, poses.at(name, time_s), plane),
@@ -121,7 +121,7 @@ def _picture_of(
         tables["tracks"] = _estimates(run, picture.trackers, poses, plane)
     if "alerts" in run.tables:
         tables["alerts"] = {
-            **about("alerts"), "time_s": run.numbers("alerts", "time_s"),
+            **base_columns("alerts"), "time_s": run.numbers("alerts", "time_s"),
             "level": run.values("alerts", "level"), **plain("alerts", *_LEVELS),
         }  # fmt: skip
         if run.has("alerts", "track"):

@@ -82,14 +82,14 @@ def closing_opportunity(
         raise ValueError(f"from_m is {from_m:g}: it must be at least to_m, {nearest:g}")
     extinction = float(check_not_negative("extinction_per_m", extinction_per_m))
 
-    def beyond(range_m: float) -> float:
+    def illuminance_beyond(range_m: float) -> float:
         return float(expn(2, extinction * range_m)) / range_m if range_m < np.inf else 0.0
 
     scale = float(check_not_negative("beta_per_sr_s", beta_per_sr_s))
     scale *= float(check_not_negative("area_m2", area_m2)) / float(
         positive("closing_mps", closing_mps)
     )
-    return scale * (beyond(nearest) - beyond(from_m))
+    return scale * (illuminance_beyond(nearest) - illuminance_beyond(from_m))
 
 
 def round_share(

@@ -142,11 +142,11 @@ has its own. Filters do not separate two targets of one cell.
 ## Clutter
 
 `[terrain] height_m` gives flat ground an echo (constant gamma, `clutter_gamma_db`) in the range
-cell of each target, as far as the beam meets it. The threshold rises with it (`clutter_threshold =
-"adaptive"`, the default): the false alarms stay what they are, a target needs its SNR over noise
-*and* clutter, and every radar sees less far. With `"noise"` the threshold stays where noise alone
-has it, as it did before there was a choice: then clutter is detected as if it were the target, and
-`check` says so; with `false_alarms` the ground is reported in every cell in which it crosses.
+cell of each target, as far as the beam meets it. The threshold rises with it (`clutter_threshold
+= "adaptive"`, the default): the false alarms stay what they are, a target needs its SNR over
+noise *and* clutter, and every radar sees less far. With `"noise"` the threshold stays where noise
+alone has it: clutter is detected as if it were the target, and with `false_alarms` the ground is
+reported in every cell in which it crosses.
 
 By default the mean power of noise and clutter is known. A real radar averages the cells around:
 `cfar_reference_cells` has it do so (cell-averaging CFAR), at the loss of so few ({loss_8:.1f} dB
@@ -160,12 +160,11 @@ without, `check` says that no weather changes it.
 
 ## Beams
 
-`azimuth_beamwidth_deg` and `elevation_beamwidth_deg` are the width of the beam, `range_cell_m` the
-depth of a cell; the grid of reports (`azimuth_resolution_deg` and so on) is the step of reported
-values, and replaces a beam only if none is given. Clutter, the number of false alarms and the
-separation of targets depend on the beam. A gain is 30,000 over the product of its beamwidths in
-degrees; where the two contradict each other by more than 3 dB, `check` says so. Every radar that
-is shipped states its beam: OASys's is not printed, and 5.8 deg follow from its gain.
+`azimuth_beamwidth_deg` and `elevation_beamwidth_deg` are the width of the beam, `range_cell_m`
+the depth of a cell; the grid of reports (`azimuth_resolution_deg` and so on) is the step of
+reported values, and replaces a beam only if none is given. Clutter, the number of false alarms
+and the separation of targets depend on the beam. A gain is 30,000 over the product of its
+beamwidths in degrees; where the two contradict each other by more than 3 dB, `check` says so.
 
 - `sidelobe_level_db`: ground and rain at the target's range all around, at a mean level below the
   beam (a ring of 2π R ΔR of ground, and of rain a shell). By default there are no sidelobes.

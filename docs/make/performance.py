@@ -21,7 +21,7 @@ import numpy as np
 
 from components.benchmark.pairs import PAIRS
 from components.benchmark.rates import RATES
-from components.benchmark.run_benchmark import fresh
+from components.benchmark.run_benchmark import measure_in_new_process
 from components.benchmark.scenes import CASES
 from docs.make import performance_growth, performance_queues
 from docs.make.performance_queues import VARIANTS
@@ -70,11 +70,12 @@ def measured(repeats: int, quick: bool) -> dict[str, Any]:
         rows = found["cases" if kind == "scenes" else kind] = {}
         for item in items:
             say(f"{time.monotonic() - started:4.0f} s: {item.name}", err=True)
-            rows[item.name] = fresh(kind, item.name, quick, repeats)
+            rows[item.name] = measure_in_new_process(kind, item.name, quick, repeats)
     found["queues"] = {
-        one.name: performance_queues.fresh(one.name, quick, repeats) for one in VARIANTS
+        one.name: performance_queues.measure_in_new_process(one.name, quick, repeats)
+        for one in VARIANTS
     }
-    found["calls"] = fresh("calls", "embed", quick, repeats)
+    found["calls"] = measure_in_new_process("calls", "embed", quick, repeats)
     found["took_s"] = round(time.monotonic() - started)
     return found
 

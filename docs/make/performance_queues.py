@@ -69,7 +69,7 @@ def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     return {"scene": variant.name, "simulated_s_per_s": median(rates[2:] or rates)}
 
 
-def fresh(name: str, quick: bool, repeats: int) -> dict[str, Any]:
+def measure_in_new_process(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     """Return the row of one way to share a processor, measured in a process of its own."""
     command = [sys.executable, "-m", "docs.make.performance_queues", name, f"--repeats={repeats}"]
     command += ["--quick"] if quick else []

@@ -17,24 +17,25 @@ class GrowingArray:
     not n times. Two that grew out of one do not see each other's: the second one moves.
     """
 
-    def __init__(self, values: AnyArray) -> None:
-        self.values = self._room = values
+    def __init__(
+        self, values: AnyArray, room: AnyArray | None = None, taken: list[int] | None = None
+    ) -> None:
+        self.values = values
+        self._room = values if room is None else room
         #: How much of the room is taken by the longest that shares it.
-        self._taken = [values.shape[-1]]
+        self._taken = [values.shape[-1]] if taken is None else taken
 
     def with_more(self, values: AnyArray) -> GrowingArray:
         """Return an array with more values at its end."""
         begin = self.values.shape[-1]
         end = begin + values.shape[-1]
-        longer = copy(self)
-        if self._taken[0] != begin or end > self._room.shape[-1]:
-            shape = (*self.values.shape[:-1], 2 * end)
-            longer._room, longer._taken = np.empty_like(self.values, shape=shape), [begin]
-            longer._room[..., :begin] = self.values
-        longer._room[..., begin:end] = values
-        longer._taken[0] = end
-        longer.values = longer._room[..., :end]
-        return longer
+        room, taken = self._room, self._taken
+        if taken[0] != begin or end > room.shape[-1]:
+            room, taken = np.empty_like(room, shape=(*room.shape[:-1], 2 * end)), [begin]
+            room[..., :begin] = self.values
+        room[..., begin:end] = values
+        taken[0] = end
+        return GrowingArray(room[..., :end], room, taken)
 
 
 class Growing:

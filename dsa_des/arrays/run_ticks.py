@@ -37,6 +37,11 @@ def is_single_run(run: IntArray) -> bool:
     return run.base is _ZERO
 
 
+def take_runs(run: IntArray, rows: IntArray) -> IntArray:
+    """Return the runs of some rows."""
+    return runs_of_single(len(rows)) if run.base is _ZERO else run[rows]
+
+
 def concatenate_runs(parts: Sequence[IntArray]) -> IntArray:
     """Return the runs of the rows of all parts, one after the other."""
     if all(part.base is _ZERO for part in parts):

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from dsa_des.arrays.types import IntArray
@@ -162,6 +163,7 @@ class Component:
         return cls
 
     @classmethod
+    @lru_cache(maxsize=512)
     def all_hooks(cls) -> tuple[Hook[Any], ...]:
         """Return the hooks of this class and its bases."""
         found = [hook for base in reversed(cls.__mro__) for hook in vars(base).get("hooks", ())]

@@ -186,7 +186,7 @@ class AnswerOfStudy:
         models = len(self._found.these)
         runs = sum(end - start for batch in self._batches for _, start, end in batch)
 
-        def begun(cpu_s: float) -> None:
+        def announce_rest(cpu_s: float) -> None:
             share = sum(end - start for _, start, end in self._batches[0]) / runs
             rest_s = cpu_s / share * (1 + models) - cpu_s
             with_so_many = "1 process" if workers == 1 else f"{workers} processes"
@@ -197,7 +197,7 @@ class AnswerOfStudy:
                 always=True,
             )
 
-        def after(done: int) -> list[int]:
+        def next_models(done: int) -> list[int]:
             left = self._remaining_models()
             self.turn_times.keep(path / _TURNS, len(self._batches))
             report = self.report()
@@ -214,7 +214,7 @@ class AnswerOfStudy:
                 always=True,
             )
             run_in_turns(self.study, folder, executor, workers, self._batches, self.turn_times,
-                         begun, after, before)  # fmt: skip
+                         announce_rest, next_models, before)  # fmt: skip
         except KeyboardInterrupt:
             return True
         except (NotWritten, OSError) as error:

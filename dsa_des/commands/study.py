@@ -14,6 +14,7 @@ from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import STUDY_JSON, StudyFolder, latest_folder
 from dsa_des.results.printing import show
 from dsa_des.results.record import Result, StudyRecord
+from dsa_des.results.rows import StoredRows
 from dsa_des.results.tables import DIFFERENCES, RATIOS, REQUIREMENTS, SUMMARY, Tables
 from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.overrides import parse_assignment
@@ -21,6 +22,7 @@ from dsa_des.studies.executors import default_workers, make_executor
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import (
     Clock,
+    Progress,
     Stopped,
     draw_run,
     run_study,
@@ -35,6 +37,7 @@ from dsa_des.text.safe_text import shell_line, shorten
 
 _HOME = Path("studies")
 _MOST_WORKERS = 1024
+_LONGEST_ERROR = 500
 
 
 def study_command(
@@ -65,11 +68,11 @@ def study_command(
     described = read_study(path, sets=sets)
     described.repeat = command_of(["study"], sets, described.path)
 
-    def again(folder: Path) -> str:
+    def resume_command(folder: Path) -> str:
         return _resume_command(name, folder, sets, workers, executor, scheduler, measure)
 
     target = target_of(_HOME, described.path.stem, out, resume)
-    folder = run_into(described, target, workers, resume, again, executor, scheduler)
+    folder = run_into(described, target, workers, resume, resume_command, executor, scheduler)
     try:
         tables = finish(
             described, folder, quiet=quiet or as_json, draw=not no_figures, as_json=as_json
@@ -77,8 +80,8 @@ def study_command(
         if measure:
             _measure(folder, silent=quiet)
     except KeyboardInterrupt:
-        stop_with("interrupted", again(folder.path), 130)
-    report_crashes([tables], again(folder.path))
+        stop_with("interrupted", resume_command(folder.path), 130)
+    report_crashes([tables], resume_command(folder.path))
 
 
 def options_as_sets(swaps: Sequence[str], seed: int | None, replicas: int | None) -> list[str]:
@@ -187,7 +190,8 @@ def run_into(
 ) -> StudyFolder:
     """Run a study into a folder; exit code 1 or 130 when it is stopped and can be resumed.
 
-    `path` is the folder, or what makes a new one; `again` is the command that continues there.
+    UsageError where no run gave a result. `path` is the folder, or what makes a new one; `again` is
+    the command that continues there.
     """
     check_workers(workers)
     executor = make_executor(kind, workers or default_workers(), scheduler)
@@ -196,7 +200,7 @@ def run_into(
         folder = StudyFolder(path if isinstance(path, Path) else path())
         folder.open(description_text(study), resume=resume)
         with _progress(study) as report:
-            run_study(study, folder, executor, report)
+            _refuse_nothing(study, folder, run_study(study, folder, executor, report))
     except Stopped as stop:
         assert folder is not None
         code = 130 if str(stop) == "interrupted" else 1
@@ -211,6 +215,16 @@ def run_into(
         if folder is not None:
             folder.close()
     return folder
+
+
+def _refuse_nothing(study: Study, folder: StudyFolder, progress: Progress) -> None:
+    """Raise UsageError where every run of a study failed: it answers nothing."""
+    if 0 < progress.failed == progress.runs and not progress.crashed:
+        why = shorten(str(StoredRows(folder).failed[0]["error"]), _LONGEST_ERROR)
+        raise UsageError(
+            f"{study.path.name}: none of its {progress.runs} runs gave a result; the first: {why}",
+            f"  `error` and `command` in {folder.parts} say it of each",
+        )
 
 
 def finish(

@@ -67,11 +67,12 @@ def status_of(path: Path, largest_bytes: int = LARGEST_BYTES) -> os.stat_result:
 
 def read_input_bytes(path: Path, largest_bytes: int = LARGEST_BYTES) -> bytes:
     """Return what is in a regular file."""
-    status_of(path, largest_bytes)
+    size = status_of(path, largest_bytes).st_size
     try:
         with path.open("rb") as file:
-            # Files such as those of /proc say that they are empty and are not.
-            content = file.read(largest_bytes + 1)
+            content = file.read(size + 1)
+            if len(content) != size:  # those of /proc say that they are empty and are not
+                content += file.read(largest_bytes)
     except OSError as error:
         raise InputFileError(f"cannot be read: {_reason(error)}") from None
     if len(content) > largest_bytes:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from dsa_des.arrays.run_ticks import is_single_run
 from dsa_des.arrays.types import BoolArray, IntArray
 
 #: By block and by what its work lacked: how many times, of how many.
@@ -43,6 +44,8 @@ def with_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
     The counts may end before the last run.
     """
     cases = lacking, every
+    if known.shape[1] < 2 and is_single_run(lacking) and is_single_run(every):
+        return known.sum(axis=1, keepdims=True) + np.array([[len(lacking)], [len(every)]])
     runs = max(known.shape[1], *(1 + int(run.max(initial=-1)) for run in cases))
     result = np.zeros((2, runs), dtype=np.int64)
     result[:, : known.shape[1]] = known
@@ -97,6 +100,9 @@ class Tries:
         The cases of each run stand together.
         """
         if not len(run):
+            return self
+        known = self.had[0] if is_single_run(run) and self.did.all() and len(self.did) else 0
+        if known and np.bitwise_or.reduce(had) | known == known:  # as most often
             return self
         first = np.flatnonzero(np.append(True, run[1:] != run[:-1]))
         mine = run[first]

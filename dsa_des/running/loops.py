@@ -96,7 +96,8 @@ def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> 
 
     opened = nx.DiGraph(graph)
     for opens in (of_source, lambda edge: _optional(graph, classes, edge)):
-        looped = cycle_numbers(opened)
+        if not (looped := cycle_numbers(opened)):
+            break
         inside = [e for e in opened.edges if looped.get(e[0], -1) == looped.get(e[1], -2)]
         opened.remove_edges_from([edge for edge in inside if opens(edge)])
     return window_order(opened, set(graph), cut_loops(opened, classes))

@@ -139,18 +139,14 @@ class Node:
 
     def undone(self) -> Mapping[str, IntArray]:
         """Return in which runs it never ran, as counts (2, runs), where there are any."""
-        idle = self._idle_runs()
         out = {} if self.outages is None else self.outages.undone()
-        if self.component.process is not None or not idle.any():
+        if self.component.process is not None or self._all_ran:
             return out
         ports = [name for name in self.channels if self.component.inputs[name].is_held]
         why = f", for nothing came at {' and '.join(sorted(ports))}" if ports else ""
+        idle = ~self._ran if len(self._ran) else np.ones(self.simulation.runs.count, dtype=bool)
         never = np.array([idle, np.ones(len(idle))], dtype=np.int64)
         return {f"it never ran{why}": never, **out}
-
-    def _idle_runs(self) -> BoolArray:
-        ran, runs = self._ran, self.simulation.runs.count
-        return np.concatenate([~ran, np.ones(runs - len(ran), dtype=bool)])
 
     def wake_at(self, tick: int) -> None:
         """Let the block run at `tick` (once, however often it is asked)."""
@@ -199,8 +195,9 @@ class Node:
         elif self.on_demand:
             for tick in self._demanded_instants(start, end).tick.tolist():
                 self.wake_at(tick)
-        for tick in self._pulses(start, end).tick.tolist():
-            self.wake_at(tick)
+        if self.pulse is not None:
+            for tick in self.pulse.between(start, end)[1].tick.tolist():
+                self.wake_at(tick)
 
     def quiet_until(self, start: int, ahead: int) -> int:
         """Return a tick, at `start` or later, before which a block in windows does not run.
@@ -223,9 +220,6 @@ class Node:
 
     def _demanded_instants(self, start: int, end: int) -> RunTicks:
         return _concatenate([demand.instants_between(start, end) for demand in self.demands])
-
-    def _pulses(self, start: int, end: int) -> RunTicks:
-        return RunTicks.empty() if self.pulse is None else self.pulse.between(start, end)[1]
 
     # -- what ----------------------------------------------------------------------------------
 
@@ -261,7 +255,7 @@ class Node:
                 scans = scans.copy()
                 scans[last_of_run(instants, own)] = numbers
         idle = None
-        if len(pulses := self._pulses(start, end)):
+        if self.pulse is not None and len(pulses := self.pulse.between(start, end)[1]):
             busy = instants
             instants = _concatenate([busy, pulses])
             idle = np.ones(len(instants), dtype=bool)
@@ -302,7 +296,8 @@ class Node:
             wake = self.outages.drop_unheard(wake)
         ticks = wake.ticks
         if not self._all_ran:
-            self._ran = ~self._idle_runs()
+            if not len(self._ran):
+                self._ran = np.zeros(self.simulation.runs.count, dtype=bool)
             self._ran[wake.run[wake.instants.first_of_each]] = True
             self._all_ran = bool(self._ran.all())
         try:

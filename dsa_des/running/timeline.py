@@ -72,7 +72,9 @@ class Timeline:
         self, name: str, component: Component, specs: list[ClockSpec]
     ) -> list[tuple[int, list[ClockSpec]]]:
         """Return from when on a block's clock is another one, and what each run says of it then."""
-        changes = []
+        changes: list[tuple[int, list[ClockSpec]]] = []
+        if not self.scene.stretches:
+            return changes
         for number, tick in enumerate(self.from_ticks.tolist()[1:]):
             if (later := self.clock_specs(name, component, number)) != specs:
                 changes.append((tick, later))

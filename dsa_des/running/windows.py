@@ -164,6 +164,17 @@ _RESTART = 32
 _CONTAINERS = (list, dict, set, deque, np.ndarray)
 
 
+class _Copied(dict[type, bool]):
+    """Whether values of a class are copied: what a block might change in place."""
+
+    def __missing__(self, kind: type) -> bool:
+        self[kind] = issubclass(kind, _CONTAINERS)
+        return self[kind]
+
+
+_copied = _Copied()
+
+
 class Rewinder:
     """Takes all blocks, wires and the record of a run back to how they were.
 
@@ -285,6 +296,5 @@ class RewindingWindows(Windows):
 def _copy_state(state: Mapping[str, Any]) -> dict[str, Any]:
     """Copy what a block might change in place; messages and tables are never changed so."""
     return {
-        name: value.copy() if isinstance(value, _CONTAINERS) else value
-        for name, value in state.items()
+        name: value.copy() if _copied[value.__class__] else value for name, value in state.items()
     }

@@ -15,6 +15,8 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
     `SceneError` refuses a name that there is not, and a block that is fed from two platforms.
     """
     known = [name for names in moved.values() for name in names]
+    if len(known) < 2 and all(one.options.platform is None for one in scene.blocks.values()):
+        return dict.fromkeys(sorted(scene.blocks.keys() - moved.keys()), next(iter(known), ""))
     near = {name: _feeding(scene, name, between=False) for name in scene.blocks}
     far = {name: _feeding(scene, name, between=True) for name in scene.blocks}
     carrying: dict[str, str] = {}

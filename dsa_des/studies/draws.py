@@ -64,11 +64,11 @@ class Draw:
             return self.values[min(int(u * len(self.values)), len(self.values) - 1)]
         low, high = self.values
         if self.kind == "normal":
-            return exact(self.key, low + high * NormalDist().inv_cdf(max(u, 2.0**-54)))
-        return exact(self.key, low + (high - low) * u)
+            return exact_clock_value(self.key, low + high * NormalDist().inv_cdf(max(u, 2.0**-54)))
+        return exact_clock_value(self.key, low + (high - low) * u)
 
 
-def exact(key: str, value: float) -> float | Fraction:
+def exact_clock_value(key: str, value: float) -> float | Fraction:
     """Return a drawn value so that clocks stay exact: whole nanoseconds, whole millihertz."""
     for ending, unit in (("_s", 10**9), ("_hz", 1000)):
         if key.endswith(ending) and not key.endswith("deg_s"):
@@ -147,7 +147,7 @@ def _check_size(key: str, kind: str, low: float, high: float) -> None:
     """Refuse a range that numbers cannot span."""
     try:
         spans = math.isfinite(high - low)
-        exact(key, low), exact(key, high)
+        exact_clock_value(key, low), exact_clock_value(key, high)
     except (OverflowError, ValueError):
         spans = False
     if not spans:

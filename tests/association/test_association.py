@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from components.association.assignment import gate_threshold, global_nearest, nearest
-from components.association.jpda import exact, marginals, propagate_beliefs
+from components.association.jpda import exact_marginals, marginals, propagate_beliefs
 
 
 def events(tracks, detections):
@@ -48,7 +48,9 @@ def test_exact_marginals_are_those_of_enumeration():
     for tracks, detections in [(1, 3), (2, 2), (3, 2), (3, 4), (4, 4)]:
         weights = 10.0 ** rng.uniform(-3, 5, (tracks, detections))
         weights[rng.uniform(size=weights.shape) < 0.3] = 0.0
-        np.testing.assert_allclose(exact(weights), enumerated(weights), rtol=1e-12, atol=1e-300)
+        np.testing.assert_allclose(
+            exact_marginals(weights), enumerated(weights), rtol=1e-12, atol=1e-300
+        )
 
 
 def test_many_clusters_together_are_each_decided_alone():
@@ -68,7 +70,7 @@ def test_many_clusters_together_are_each_decided_alone():
 def test_propagation_is_close_and_exact_where_nothing_is_shared():
     rng = np.random.default_rng(9)
     single = 10.0 ** rng.uniform(-1, 3, (1, 6))
-    np.testing.assert_allclose(propagate_beliefs(single), exact(single), rtol=1e-9)
+    np.testing.assert_allclose(propagate_beliefs(single), exact_marginals(single), rtol=1e-9)
     for _ in range(20):
         weights = 10.0 ** rng.uniform(-1, 2, (4, 5)) * (rng.uniform(size=(4, 5)) < 0.5)
         assert np.abs(propagate_beliefs(weights) - enumerated(weights)).max() < 0.1

@@ -137,7 +137,7 @@ def test_a_study_that_is_stopped_says_how_to_go_on(
         ("dsa_des.commands.study.read_study", ["study", "study.toml"]),
         ("dsa_des.commands.compare.run_into", ["compare", "{scene}", "{scene}"]),
         ("components.thesis.reproduce.make", ["reproduce", "table-4.1"]),
-        ("components.benchmark.run_benchmark.fresh", ["benchmark", "--quick"]),
+        ("components.benchmark.run_benchmark.measure_in_new_process", ["benchmark", "--quick"]),
         ("dsa_des.commands.group.entry_points_of", ["--help"]),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",

@@ -235,7 +235,8 @@ def test_pages_and_rows_are_checked_beforehand(
 ) -> None:
     monkeypatch.setattr("components.thesis.reproduce.make", lambda *a: pytest.fail("it ran"))
     monkeypatch.setattr(
-        "components.benchmark.run_benchmark.fresh", lambda *a: pytest.fail("it ran")
+        "components.benchmark.run_benchmark.measure_in_new_process",
+        lambda *a: pytest.fail("it ran"),
     )
     before = everything_in(places)
     for name in ("run", "pipe", "loop", "no/x", "a" * 300, ""):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from components.formats.csv_file import read_csv
+from components.formats.recorded import known_kinds
 from components.formats.text_rows import TrafficFileError
 
 FOOT, KNOT, MILE_S = 0.3048, 1852 / 3600, 1609.344 / 3600
@@ -329,3 +330,89 @@ def test_one_aircraft_with_wrong_places_stays_one_and_an_address_is_one_aircraft
     taken = shared(sorted(FIRST + late)) + "0,DUP1 (2),46,6,900\n9,DUP1 (2),46,6.01,900\n"
     names = [craft.name for craft in read(tmp_path, taken).aircraft]
     assert names == ["DUP1", "DUP1 (3)", "OTHER", "DUP1 (2)"]
+
+
+def test_a_table_that_a_shell_drew_is_read(tmp_path):
+    """Impala's repeats its names between blocks; Trino's has no bars at its edges."""
+    names = " | ".join(("time      ", "icao24", "lat   ", "lon", "baroaltitude", "squawk"))
+    rows = [
+        " | ".join((str(1480760792 + k), "a0d724", f"47.00{k}", "8.0", "1000        ", "NULL  "))
+        for k in range(4)
+    ]
+    line = "+".join("-" * (len(cell) + 2) for cell in names.split(" | "))
+    frame, bars = f"+{line}+", [f"| {one} |" for one in (names, *rows)]
+    impala = ["Query: select * from x", frame, bars[0], frame, *bars[1:3], frame, bars[0], frame,
+              *bars[3:], frame, "Fetched 4 row(s) in 1.03s"]  # fmt: skip
+    trino = [f" {names} ", line, *(f" {one} " for one in rows), "(4 rows)"]
+    for drawn in (impala, trino):
+        path = tmp_path / "log.txt"
+        path.write_text("\n".join(drawn))
+        (flown,) = known_kinds.record(path).flights().aircraft
+        assert flown.name == "a0d724" and flown.alt_m.tolist() == [1000.0] * 4
+        assert flown.lat_deg.tolist() == [47.0, 47.001, 47.002, 47.003]
+        assert flown.sample_times_s.tolist() == [0.0, 1.0, 2.0, 3.0]
+
+
+GRANULAR = """\
+network_time,receiver_time,hex,callsign,latitude,longitude,altitude,speed,track,vspeed,,
+2024-01-02 07:41:03Z.515,1970-01-01 00:00:00Z.000,0x8467d8,T1,41.5,141.6,1000,100,0,64,,
+2024-01-02 07:41:03Z.572,2024-01-02 07:41:02Z.991,0x8467d8,T1,41.4998,141.6,1000,100,0,64,,
+2024-01-02 07:41:04Z.100,2024-01-02 07:41:04Z.000,0x8467d8,T1,0,0,1000,0,0,0,,
+2024-01-02 07:41:04Z.515,2024-01-02 07:41:04Z.400,0x8467d8,T1,41.5005,141.6,1000,100,0,64,,
+2024-01-02 07:41:06Z.015,2024-01-02 07:41:05Z.900,0x8467d8,T1,41.5012,141.6,0,0,0,0,,
+"""
+
+
+def test_flightradar24_s_messages_are_thinned_to_a_second(tmp_path):
+    """Receivers' clocks are wrong, zeros are no position, and 0 ft is the ground."""
+    path = tmp_path / "t.csv"
+    path.write_text(GRANULAR)
+    flown = known_kinds.record(path).flights()
+    assert flown.start_time_s == 1704181263.515
+    assert flown.ownship.name == "8467d8"
+    assert flown.ownship.sample_times_s.tolist() == [0.0, 1.0]
+    assert flown.ownship.lat_deg.tolist() == [41.5, 41.5005]
+    assert flown.ownship.alt_m.tolist() == [1000 * FOOT] * 2
+    assert flown.ownship.velocity_enu_mps[1] == pytest.approx([100 * KNOT] * 2)
+    assert flown.warnings == [
+        "1 positions were left out that came within a second of another: receivers' delays differ "
+        "by as much",
+        "2 rows were left out that had no position or no height",
+    ]
+
+
+def test_zeros_are_a_position_near_there_only(tmp_path):
+    rows = "0,a,{0},0,1000\n1,a,0,0,1000\n0,b,47,8,1000\n1,b,0,0,1000\n"
+    for lat, there in (("0.01", 2), ("20", 1)):
+        file = read(tmp_path, f"time,id,lat,lon,alt\n{rows.format(lat)}")
+        assert [len(one.alt_m) for one in file.aircraft] == [there, 1]
+
+
+def test_a_clock_of_whole_seconds_says_several_places_of_each(tmp_path):
+    rows = [f"{k // 2},a,{47 + 1e-4 * k:.4f},8,{1000 + k},0" for k in range(8)]
+    text = "\n".join(["time,id,lat,lon,alt,squawk", *rows, "0,b,47,9,1,0\n"])
+    own = read(tmp_path, text).ownship
+    assert own.sample_times_s.tolist() == [0.0, 1.0, 2.0, 3.0]
+    assert own.lat_deg.tolist() == [47.0001, 47.0003, 47.0005, 47.0007]
+    with pytest.raises(TrafficFileError, match="a already has a sample at 0 s"):
+        read(tmp_path, text.replace("47.0001", "47.0011"))
+
+
+def test_days_of_silence_are_a_gap_where_times_are_dates(tmp_path):
+    text = "time,id,lat,lon,alt\n" + "".join(f"{{{k}}},a,47,8,1000\n" for k in range(4))
+    path = tmp_path / "t.csv"
+    for begins, days, taken in ((1.7e9, 40, True), (1.7e9, 400, False), (5.0, 2, False)):
+        path.write_text(text.format(*(begins + k for k in (0, 1, 2, 86400 * days))))
+        if taken:
+            own = known_kinds.record(path).flights(None).ownship
+            assert own.away.tolist() == [False, False, True, False]
+            assert own.sample_times_s[3] == 40 * 86400
+            continue
+        with pytest.raises(TrafficFileError, match="more than 86400 s, where it says dates 366"):
+            known_kinds.record(path)
+
+
+def test_a_unit_may_be_joined_to_a_name_by_its_capital(tmp_path):
+    text = "timeMs,id,lat,lon,altFt\n0,a,47,8,1000\n500,a,47,8,1000\n0,b,47,8.1,1000\n"
+    own = read(tmp_path, text).ownship
+    assert own.sample_times_s.tolist() == [0.0, 0.5] and own.alt_m.tolist() == [1000 * FOOT] * 2

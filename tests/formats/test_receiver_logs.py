@@ -157,6 +157,39 @@ def test_openskys_states_are_in_metres_at_the_times_of_their_positions(tmp_path)
         read(tmp_path, content, ownship="None")
 
 
+def test_flightradar24_s_json_is_in_feet_at_its_own_times(tmp_path):
+    """The feed, a playback and details of flights: 0 ft, or its sign, is the ground."""
+    feed = {"full_count": 2, "version": 4, "stats": {"total": {}}}
+    for k, (name, ground) in enumerate((("7C6DBB", 0), ("", 1))):
+        feed[f"b{k}"] = [name, -37.5, 144.6 + k, 90, 3000, 100, "1353", "F-YMEN2", "B738", "VH",
+                         1474583552,
+                         "MEL", "BNE", "QF1", ground, 64, f"QFA{k}", 0]  # fmt: skip
+    moves = [("feet", 3000), ("feet", 0)]
+    track = [
+        {"latitude": -37.5, "longitude": 144.6, "altitude": {one: feet}, "speed": {"kts": 100},
+         "verticalSpeed": {"fpm": 64}, "heading": 90, "timestamp": 1474583552 + k}
+        for k, (one, feet) in enumerate(moves)
+    ]  # fmt: skip
+    flight = {"identification": {"id": "2f", "callsign": "QFA0"}, "track": track,
+              "aircraft": {"identification": {"modes": "7C6DBB"}}}  # fmt: skip
+    playback = {"result": {"response": {"data": {"flight": flight}}}, "_api": {}}
+    trail = [{"lat": -37.5, "lng": 144.6, "alt": 3000, "spd": 100, "ts": 1474583552, "hd": 90},
+             {"lat": -37.5, "lng": 144.6, "alt": 0, "spd": 0, "ts": 1.5e9, "hd": 90}]  # fmt: skip
+    details = {"identification": {"id": "2f", "callsign": "QFA0"}, "trail": trail,
+               "aircraft": {"hex": "7C6DBB"}}  # fmt: skip
+    for content in (feed, playback, details):
+        found = record(tmp_path, content)
+        ((name, samples),) = found.samples.items()
+        assert (name, found.callsigns[name]) == ("7C6DBB", "QFA0")
+        assert found.height == "barometric altitude" and found.units == "ft and kt"
+        assert [samples[key].tolist() for key in ("time", "lat", "lon", "alt")] == [
+            [1474583552], [-37.5], [144.6], [3000 * FOOT],
+        ]  # fmt: skip
+        if content is not details:
+            assert samples["ve"] == pytest.approx([100 * KNOT])
+            assert samples["vu"] == pytest.approx([64 * FOOT / 60])
+
+
 SBS = """\
 MSG,1,1,1,A1,1,2024/06/01,23:59:58.000,2024/06/01,23:59:58.000,TEST1   ,,,,,,,,,,,
 MSG,4,1,1,A1,1,2024/06/01,23:59:58.500,2024/06/01,23:59:58.500,,,100,0,,,64,,,,,

@@ -16,6 +16,7 @@ from components.fusion.pick_best import closest_clock_distance_s
 from components.guidance.mvp import VoltagePotential
 from components.messages.reach import FarthestLook
 from components.surveillance.exchange import PositionExchange
+from dsa_des.arrays.run_ticks import runs_of_single
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.record.undone import Tries, add_counts
 from dsa_des.replicas.lockstep import lock_step
@@ -304,3 +305,7 @@ def test_tries_of_runs_add_up_whatever_comes_when() -> None:
     assert tries.undone("x", of_two=True)["x"].tolist() == [[0, 0, 1, 0, 0], [0, 0, 1, 0, 1]]
     assert tries.undone("x")["x"].tolist() == [[1, 0, 1, 0, 0], [1, 0, 1, 0, 1]]
     assert Tries().undone("x")["x"].shape == (2, 0)
+    alone = Tries().add_tries(runs_of_single(1), np.array([1]), np.array([True]))
+    for _ in range(2):  # a second source comes later, and it is done no more
+        alone = alone.add_tries(runs_of_single(2), np.array([1, 2]), np.zeros(2, dtype=bool))
+    assert alone.undone("x", of_two=True)["x"].tolist() == [[0], [1]]

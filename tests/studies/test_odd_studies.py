@@ -161,3 +161,15 @@ def test_text_that_looks_like_a_pattern_of_files_stays_text(tmp_path: Path, valu
     assert resolve_tables(tables, []) == {"axes": {"title": [value]}}
     files = {"axes": {"file": {"files": SourcedText.from_text("a*.daa", tmp_path)}}}
     assert resolve_tables(files, [])["axes"]["file"]["files"] == str(tmp_path.resolve() / "a*.daa")
+
+
+def test_a_study_none_of_whose_runs_gives_a_result_is_an_error(small: Path) -> None:
+    """Where one run has a result the others are counted: `test_study_survives`."""
+    broken = 'set.blocks.radar.flaw = "raise"\n'
+    Path("study.toml").write_text(STUDY.replace("replicas = 1", "replicas = 3") + broken)
+    words = ["study", "study.toml", "--workers", "1", "--out", "o"]
+    done = dsa_des(*words, code=2)
+    said = "error: study.toml: none of its 3 runs gave a result; the first: radar (fragile:Fragile)"
+    assert done.stdout == "" and done.stderr.startswith(said)
+    assert dsa_des(*words, "--resume", code=2).stderr == done.stderr
+    assert "3 runs failed" in dsa_des("study", "show", "o", code=0).stdout

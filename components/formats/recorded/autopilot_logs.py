@@ -71,25 +71,27 @@ def _own_of_ulog(
         yield from _own_samples(topics, name, stem)
 
 
+#: So many messages are taken at a time.
+_AT_ONCE = 8192
+
+
 def _own_samples(topics: Mapping[str, Topic], name: str, stem: str) -> Iterator[PositionReport]:
-    own = {key: np.asarray(values, float) for key, values in topics[name].items()}
-    boot_s = own["timestamp"] / 1e6
-    if "latitude_deg" in own:
-        lat, lon, alt = own["latitude_deg"], own["longitude_deg"], own["altitude_msl_m"]
-    elif name == _POSITIONS[0]:
-        lat, lon, alt = own["lat"], own["lon"], own["alt"]
-    else:
-        lat, lon, alt = own["lat"] * 1e-7, own["lon"] * 1e-7, own["alt"] * 1e-3
-    move = _velocity(topics, own, boot_s)
-    angles = _attitude(topics, boot_s)
-    fix = own.get("fix_type", np.full(len(lat), 3.0)) >= 2
-    columns = np.stack([boot_s + _utc_less_boot_s(topics), lat, lon, alt, *move, *angles])
-    for time_s, lat_deg, lon_deg, alt_m, trk, gs, vs, yaw, pitch, roll in columns[
-        :, fix
-    ].T.tolist():
-        yield PositionReport(
-            stem, time_s, lat_deg, lon_deg, alt_m, None, trk, gs, vs, yaw, pitch, roll
-        )
+    utc_less_boot_s = _utc_less_boot_s(topics)
+    for first in range(0, len(topics[name]["timestamp"]), _AT_ONCE):
+        block = slice(first, first + _AT_ONCE)
+        own = {key: np.asarray(values[block], float) for key, values in topics[name].items()}
+        boot_s = own["timestamp"] / 1e6
+        if "latitude_deg" in own:
+            lat, lon, alt = own["latitude_deg"], own["longitude_deg"], own["altitude_msl_m"]
+        elif name == _POSITIONS[0]:
+            lat, lon, alt = own["lat"], own["lon"], own["alt"]
+        else:
+            lat, lon, alt = own["lat"] * 1e-7, own["lon"] * 1e-7, own["alt"] * 1e-3
+        move, angles = _velocity(topics, own, boot_s), _attitude(topics, boot_s)
+        fix = own.get("fix_type", np.full(len(lat), 3.0)) >= 2
+        columns = np.stack([boot_s + utc_less_boot_s, lat, lon, alt, *move, *angles])
+        for time_s, lat_deg, lon_deg, alt_m, *others in columns[:, fix].T.tolist():
+            yield PositionReport(stem, time_s, lat_deg, lon_deg, alt_m, None, *others)
 
 
 def _latest_values(times_s: FloatArray, values: AnyArray, wanted_s: FloatArray) -> FloatArray:
@@ -122,7 +124,7 @@ def _attitude(topics: Mapping[str, Topic], boot_s: FloatArray) -> list[FloatArra
         return [np.full(len(boot_s), np.nan)] * 3
     times_s = np.asarray(known["timestamp"], float) / 1e6
     at = np.clip(np.searchsorted(times_s, boot_s, side="right") - 1, 0, None)
-    w, x, y, z = np.asarray(known["q"], float)[at].T
+    w, x, y, z = np.asarray(known["q"][at], float).T
     yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
     roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))

@@ -3,9 +3,10 @@
 import re
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
+from itertools import islice
 
 from components.formats.reports import Log, PositionReport
-from components.formats.text_rows import Problems, lines_of
+from components.formats.text_rows import Problems, each_line, text_of
 
 _DATE = re.compile(r"HFDTE(?:DATE)?:?\s*(\d\d)(\d\d)(\d\d)", re.IGNORECASE)
 _FIX = re.compile(
@@ -13,6 +14,7 @@ _FIX = re.compile(
 )
 #: Whose header says what the aircraft is called: competition number, else registration.
 _NAMES = (re.compile(r"HFCID[^:]*:\s*(\S.*)", re.I), re.compile(r"HFGID[^:]*:\s*(\S.*)", re.I))
+_NAMELESS = frozenset({"none", "nkn", "nil", "unknown", "not recorded"})
 _EXTENSION = re.compile(r"(\d\d)(\d\d)([A-Z0-9]{3})")
 _DAY = timedelta(days=1)
 
@@ -25,29 +27,29 @@ def is_igc(head: bytes) -> bool:
 
 def igc_log(problems: Problems, data: bytes, stem: str) -> Log:
     """Return the flight of an IGC file: pressure altitude, GNSS altitude above the ellipsoid."""
-    lines = lines_of(data, problems)
+    text = text_of(data, problems)
     warnings: list[str] = []
-    fixes = _fixes(problems, lines, _name(lines) or stem, warnings)
+    fixes = _fixes(problems, text, _name(text) or stem, warnings)
     return Log("an IGC file", "m", fixes, {}, "fixes", warnings)
 
 
-def _name(lines: list[tuple[int, str]]) -> str:
+def _name(text: str) -> str:
     for pattern in _NAMES:
-        for _, line in lines[:200]:
-            if match := pattern.match(line):
+        for _, line in islice(each_line(text), 200):
+            if (match := pattern.match(line)) and match[1].strip().lower() not in _NAMELESS:
                 return match[1].strip()
     return ""
 
 
 def _fixes(
-    problems: Problems, lines: list[tuple[int, str]], name: str, warnings: list[str]
+    problems: Problems, text: str, name: str, warnings: list[str]
 ) -> Iterator[tuple[int, PositionReport]]:
     day: datetime | None = None
     damaged: list[int] = []
     last_s = -1
     more: dict[str, slice] = {}
-    pressed = any(one[1][25:30].strip("0") for one in lines if _FIX.match(one[1]))
-    for number, line in lines:
+    pressed = any(one[25:30].strip("0") for _, one in each_line(text) if _FIX.match(one))
+    for number, line in each_line(text):
         if match := _DATE.match(line):
             try:
                 day = datetime(2000 + int(match[3]), int(match[2]), int(match[1]), tzinfo=UTC)

@@ -1,6 +1,7 @@
 """Read records in JSON, a list of them or one in each line, with the columns of a table."""
 
 from collections.abc import Iterable, Iterator
+from itertools import chain
 from typing import Any
 
 from components.formats.csv_file import known_among, record_rows
@@ -24,15 +25,16 @@ def record_json(
 ) -> Recording:
     """Return the aircraft of records, in a list or a line each, with the columns of a table."""
     warnings: list[str] = []
-    records = _records(problems, data, [])
-    first = next(records, (1, None))[1]
+    records = _records(problems, data, warnings)
+    del data
+    begins, first = next(records, (1, None))
     if first is None or known_among(map(str, first)) < _FEWEST:
         problems.fail(UNKNOWN_JSON)
     headers = [str(key) for key in first]
     keys = list(headers)
 
     def rows() -> Iterator[tuple[int, list[str]]]:
-        for number, one in _records(problems, data, warnings):
+        for number, one in chain([(begins, first)], records):
             yield (
                 number,
                 [
@@ -63,12 +65,10 @@ def _records(
 
 
 def _rows_of(document: Any) -> Iterable[Any]:
-    """Return the records of a document: a list of them, one, or columns as pandas writes them."""
-    if isinstance(document, list):
-        return document
+    """Return the records of a document: one, or columns as pandas writes them."""
     if isinstance(document, dict):
         columns, rows = document.get("columns"), document.get("data")
-        if isinstance(columns, list) and isinstance(rows, list):
+        if columns is not None and isinstance(rows, Iterable):
             return (dict(zip(map(str, columns), row, strict=False)) for row in rows)
         first = next(iter(document.values()), None)
         if first and all(isinstance(one, dict) for one in document.values()):

@@ -35,9 +35,10 @@ from dsa_des.files.input_files import LARGEST_BYTES
 
 #: What is read, for messages.
 KINDS = (
-    "aircraft.json and traces of readsb, SBS-1 lines, OpenSky's states (JSON, CSV, Parquet), "
-    "tables with time, name, latitude, longitude and altitude, .daa and .xyz of DAIDALUS, GPX, KML "
-    "with times, IGC, PX4's .ulg, MAVLink's .tlog, and ASTERIX, also in pcap and pcapng"
+    "aircraft.json and traces of readsb, SBS-1 lines, OpenSky's states (JSON, CSV, Parquet, text), "
+    "FlightRadar24's JSON, tables with time, name, latitude, longitude and altitude, .daa and .xyz "
+    "of DAIDALUS, GPX, KML with times, IGC, PX4's .ulg, MAVLink's .tlog, and ASTERIX, also in pcap "
+    "and pcapng"
 )
 #: So many of the needed columns may be missing of what is taken for a table of ours.
 _LACKING = 3
@@ -96,11 +97,12 @@ def record(
         if data.startswith(begins):
             problems.fail(f"{said}; what is read: {KINDS}")
     text = text_of(data, problems, f"a file of a known kind ({KINDS})")
-    del data
-    if path.suffix.lower() in (".daa", ".xyz") or _is_daa(text):
-        return record_daa(problems, text, place or (0.0, 0.0, 0.0))
+    lines, is_daa = each_line(text), _is_daa(text)
+    del data, text  # the lines hold it while there are more
+    if path.suffix.lower() in (".daa", ".xyz") or is_daa:
+        return record_daa(problems, lines, place or (0.0, 0.0, 0.0))
     try:
-        return record_table(problems, text, None, altitude, stem)
+        return record_table(problems, lines, None, altitude, stem)
     except TrafficFileError as error:
         if sum("there is no column" in problem for problem in error.problems) < _LACKING:
             raise

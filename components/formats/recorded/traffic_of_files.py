@@ -20,7 +20,7 @@ from components.formats.recorded.selection import (
     with_ownship,
 )
 from components.formats.recording import Recording, Samples
-from components.formats.sample_columns import Altitude
+from components.formats.sample_columns import EPOCH_S, Altitude
 from components.formats.text_rows import TrafficFile
 from components.geometry import slant_range_m
 
@@ -205,12 +205,8 @@ def _note_itself(file: TrafficFile) -> None:
             )
 
 
-#: Clocks that read more count from 1970.
-_EPOCH_S = 1e8
-
-
 def clock(time_s: float) -> str:
     """Return an instant as text for people: in UTC where the clock counts from 1970."""
-    if not _EPOCH_S < time_s < 4e9:
+    if not EPOCH_S < time_s < 4e9:
         return f"{time_s:.1f} s"
     return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d %H:%M:%S} UTC"

@@ -34,7 +34,8 @@ def read_topics(
     formats: dict[str, str] = {}
     topics: dict[int, str] = {}
     instances: dict[str, int] = {}
-    rows: dict[str, list[bytes]] = {}
+    sizes: dict[str, int] = {}
+    rows: dict[str, bytearray] = {}
     at = _HEADER
     while at + _HEAD.size <= len(data):
         size, kind = _HEAD.unpack_from(data, at)
@@ -48,7 +49,9 @@ def read_topics(
         if kind == ord("D"):
             name = topics.get(int.from_bytes(data[at + 3 : at + 5], "little"))
             if name is not None:
-                rows[name].append(data[at + 5 : end])
+                # What pads a message at its end is not logged.
+                whole = sizes[name]
+                rows[name] += data[at + 5 : min(end, at + 5 + whole)].ljust(whole, b"\0")
         elif kind == ord("F"):
             name, _, fields = data[at + 3 : end].decode("latin-1").partition(":")
             formats[name] = fields
@@ -59,20 +62,19 @@ def read_topics(
                     topics = {number: one for number, one in topics.items() if one != name}
                     instances[name] = data[at + 3]
                 topics[int.from_bytes(data[at + 4 : at + 6], "little")] = name
-                rows[name] = []
+                rows[name] = bytearray()
+                sizes[name] = _layout(problems, name, formats, 0)[1]
         at = end
     return {name: _topic(problems, name, formats, rows[name]) for name in rows if rows[name]}
 
 
-def _topic(problems: Problems, name: str, formats: Mapping[str, str], rows: list[bytes]) -> Topic:
+def _topic(problems: Problems, name: str, formats: Mapping[str, str], rows: bytearray) -> Topic:
     fields, size = _layout(problems, name, formats, 0)
     dtype = np.dtype({
         "names": list(fields), "formats": [form for form, _ in fields.values()],
         "offsets": [offset for _, offset in fields.values()], "itemsize": size,
     })  # fmt: skip
-    # What pads a message at its end is not logged.
-    whole = b"".join(row[:size].ljust(size, b"\0") for row in rows)
-    table = np.frombuffer(whole, dtype=dtype)
+    table = np.frombuffer(rows, dtype=dtype)
     return {field: table[field] for field in fields}
 
 

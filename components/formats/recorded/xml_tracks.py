@@ -1,10 +1,10 @@
 """Read tracks in XML: GPX, and KML with times (``gx:Track``, or a ``TimeStamp`` at each point)."""
 
-import io
-from collections.abc import Iterator
+import math
+from array import array
+from collections.abc import Collection, Iterator, Sequence
 from datetime import UTC, datetime
-from typing import Any
-from xml.etree import ElementTree
+from xml.parsers import expat
 
 from components.formats.reports import ABOVE_SEA, Log, PositionReport
 from components.formats.text_rows import Problems
@@ -28,18 +28,18 @@ def xml_log(problems: Problems, data: bytes, stem: str) -> Log | None:
     return None
 
 
-#: Name, time, longitude, latitude and height, as they are written.
-_Point = tuple[str, str, str, str, str]
+#: Name, time (text where it is none), longitude, latitude and height.
+_Point = tuple[str, float | str | None, float | None, float | None, float | None]
 
 
 def _points(problems: Problems, points: Iterator[_Point]) -> Iterator[tuple[int, PositionReport]]:
     timed, number = 0, 0
     for number, (name, when, lon, lat, up) in enumerate(points, start=1):
-        time_s = _instant(when)
-        if when and time_s is None:
+        time_s = None if isinstance(when, str) else when
+        if isinstance(when, str):
             problems.add(f"{when[:40]!r} is no date and time", line=number)
         timed += time_s is not None
-        yield number, PositionReport(name, time_s, _float(lat), _float(lon), geometric=_float(up))
+        yield number, PositionReport(name, time_s, lat, lon, geometric=up)
     if not timed:
         what = f"its {number} positions have no times" if number else "there is no track in it"
         problems.fail(
@@ -48,114 +48,136 @@ def _points(problems: Problems, points: Iterator[_Point]) -> Iterator[tuple[int,
         )
 
 
-def _instant(text: str) -> float | None:
+def _instant(text: str) -> float | str | None:
+    """Return an instant; the text itself where it is none, None where it is empty."""
     try:
         when = datetime.fromisoformat(text)
     except ValueError:
-        return None
+        return text or None
     return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
 
 
-def _float(text: str) -> float | None:
+def _float(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        return None
+        return math.nan
 
 
-def _elements(problems: Problems, data: bytes) -> Iterator[tuple[str, str, Any]]:
-    """Give "start" or "end", the plain name, and the element; what has ended is thrown away."""
+#: So much of a file is parsed at a time.
+_CHUNK = 2**16
+
+
+def _elements(
+    problems: Problems, data: bytes, begins: Collection[str], ends: Collection[str]
+) -> Iterator[tuple[str, dict[str, str] | None, str, tuple[str, ...]]]:
+    """Give name, attributes, text and parents of some elements; no text at begins, nor attributes
+    at ends.
+    """
+    events: list[tuple[str, dict[str, str] | None, str, tuple[str, ...]]] = []
+    inside: list[str] = []
+    text: list[str] = []
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        tag = tag.rpartition(":")[2]
+        text.clear()
+        if tag in begins:
+            events.append((tag, attributes, "", tuple(inside)))
+        inside.append(tag)
+
+    def end(_: str) -> None:
+        if (tag := inside.pop()) in ends:
+            events.append((tag, None, "".join(text).strip(), tuple(inside)))
+        text.clear()
+
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    parser.CharacterDataHandler = text.append
     try:
-        for event, element in ElementTree.iterparse(io.BytesIO(data), ("start", "end")):
-            yield event, element.tag.rpartition("}")[2], element
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        for first in range(0, len(data), _CHUNK):
+            parser.Parse(data[first : first + _CHUNK], first + _CHUNK >= len(data))
+            yield from events
+            events.clear()
+    except (expat.ExpatError, LookupError) as error:
         problems.fail(f"is no XML that can be read: {error}")
 
 
-def _text(element: Any) -> str:
-    return (element.text or "").strip()
-
-
 def _of_gpx(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
-    name, tracks = "", 0
+    name = ele = when = ""
     names: dict[str, int] = {}
-    inside: list[str] = []
-    ele = when = ""
-    for event, tag, element in _elements(problems, data):
-        if event == "start":
-            inside.append(tag)
-            if tag == "trk":
-                name, tracks = stem, tracks + 1
-                names[name] = names.get(name, 0) + 1
-            continue
-        inside.pop()
-        if tag == "name" and inside[-1:] == ["trk"] and _text(element):
-            names[name] -= 1
-            name = _text(element)
+    place: dict[str, str] = {}
+    ends = {"name", "ele", "time", "trkpt"}
+    for tag, attributes, text, inside in _elements(problems, data, {"trk", "trkpt"}, ends):
+        if tag == "trk":
+            name = stem
             names[name] = names.get(name, 0) + 1
-        elif tag == "ele":
-            ele = _text(element)
-        elif tag == "time":
-            when = _text(element)
+        elif attributes is not None:
+            place, ele, when = attributes, "", ""
         elif tag == "trkpt":
             called = name if names.get(name, 0) < 2 else f"{name} {names[name]}"
-            yield called, when, element.get("lon", ""), element.get("lat", ""), ele
-            ele = when = ""
-        if tag in ("trkpt", "trkseg", "trk", "wpt", "rte"):
-            element.clear()
+            lon, lat = (_float(place.get(key, "")) for key in ("lon", "lat"))
+            yield called, _instant(when), lon, lat, _float(ele)
+        elif tag == "name" and inside[-1:] == ("trk",) and text:
+            names[name] -= 1
+            name = text
+            names[name] = names.get(name, 0) + 1
+        elif inside[-1:] == ("trkpt",) and tag != "name":
+            ele, when = (text, when) if tag == "ele" else (ele, text)
 
 
 def _of_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -> Iterator[_Point]:
     """Give the points of tracks, and those of placemarks with a time each."""
     names: dict[int, str] = {}
-    inside: list[str] = []
     tracks: dict[str, int] = {}
-    whens: list[str] = []
-    coords: list[str] = []
+    whens, coords, odd = array("d"), array("d"), dict[int, str | None]()
     when = point = ""
-    for event, tag, element in _elements(problems, data):
-        if event == "start":
-            inside.append(tag)
-            if tag == "Track":
-                whens, coords = [], []
-            if tag == "Placemark":
-                when = point = ""
-                names.pop(len(inside), None)
-            continue
-        depth = len(inside)
-        inside.pop()
-        if tag == "name":
-            names[depth - 1] = _text(element)
-        elif tag == "altitudeMode" and _text(element) in _GROUND and not warnings:
-            if inside[-1:] in (["Track"], ["Point"]):
-                mode = _text(element)
-                said = f"heights are {_GROUND[mode]} (altitudeMode {mode})"
+    begins = {"Track", "Placemark"}
+    ends = {"name", "altitudeMode", "when", "coord", "coordinates", *begins}
+    for tag, attributes, text, inside in _elements(problems, data, begins, ends):
+        parent = inside[-1] if inside else ""
+        if attributes is not None and tag == "Track":
+            whens, coords, odd = array("d"), array("d"), {}
+        elif attributes is not None:
+            when = point = ""
+            names.pop(len(inside) + 1, None)
+        elif tag == "name":
+            names[len(inside)] = text
+        elif tag == "altitudeMode":
+            if text in _GROUND and not warnings and parent in ("Track", "Point"):
+                said = f"heights are {_GROUND[text]} (altitudeMode {text})"
                 warnings.append(f"{said} and are read as above mean sea level")
-        elif tag == "when" and inside[-1:] == ["Track"]:
-            whens.append(_text(element))
+        elif tag == "when" and parent == "Track":
+            time_s = _instant(text)
+            if isinstance(time_s, float):
+                whens.append(time_s)
+            else:
+                odd[len(whens)] = time_s
+                whens.append(math.nan)
         elif tag == "coord":
-            coords.append(_text(element))
+            coords.extend(_three(text.split()))
         elif tag == "when":
-            when = _text(element)
-        elif tag == "coordinates" and inside[-1:] == ["Point"]:
-            point = _text(element)
+            when = text
+        elif tag == "coordinates" and parent == "Point":
+            point = text
         elif tag == "Track":
-            if len(whens) != len(coords):
-                problems.fail(f"a gx:Track has {len(whens)} times and {len(coords)} positions")
+            if 3 * len(whens) != len(coords):
+                said = f"{len(whens)} times and {len(coords) // 3} positions"
+                problems.fail(f"a gx:Track has {said}")
             at = max((k for k, one in enumerate(inside) if one == "Placemark"), default=-1) + 1
             name = names.get(at) or names.get(_document(inside)) or stem
             if "MultiTrack" not in inside:
                 tracks[name] = tracks.get(name, 0) + 1
             called = name if tracks.get(name, 0) < 2 else f"{name} {tracks[name]}"
-            for one, coord in zip(whens, coords, strict=True):
-                yield called, one, *_three(coord.split())
+            for k, one in enumerate(whens):
+                lon, lat, up = coords[3 * k : 3 * k + 3]
+                yield called, odd.get(k, one), lon, lat, up
         elif tag == "Placemark" and point and when:
-            yield names.get(_document(inside)) or stem, when, *_three(point.split(","))
-        if tag in ("Placemark", "Track", "when", "coord", "Style", "StyleMap"):
-            element.clear()
+            name = names.get(_document(inside)) or stem
+            yield name, _instant(when), *_three(point.split(","))
 
 
-def _document(inside: list[str]) -> int:
+def _document(inside: Sequence[str]) -> int:
     """Return at which depth the document is, whose name all that has none of its own goes by."""
     return inside.index("Document") + 1 if "Document" in inside else 0
 
@@ -164,6 +186,6 @@ def _document(inside: list[str]) -> int:
 _GROUND = {"relativeToGround": "above ground", "clampToGround": "not meant"}
 
 
-def _three(parts: list[str]) -> tuple[str, str, str]:
-    lon, lat, up = [*parts, "", "", ""][:3]
-    return lon.strip(), lat.strip(), up.strip()
+def _three(parts: list[str]) -> tuple[float, float, float]:
+    lon, lat, up = map(_float, [*parts, "", "", ""][:3])
+    return lon, lat, up

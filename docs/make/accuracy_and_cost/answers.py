@@ -75,7 +75,8 @@ def head(made: Sequence[AnswerReport], studies: Sequence[AskedStudy] = STUDIES) 
     for asked, report in zip(studies, made, strict=True):
         for name in report.verdicts:
             said = report.sentences(name)
-            lines.append(f"- **{asked.heading}**, `{name}`. {' '.join(said[1:3])}")
+            decision = " ".join(said[1:3]).partition(" Front, cheapest first:")[0]
+            lines.append(f"- **{asked.heading}**, `{name}`. {decision}")
     return "\n".join(lines)
 
 

@@ -83,18 +83,16 @@ blocks.traffic.file=encounters/crossing.daa
 ```
 
 For a calibrated camera, frames with their own time stamps, and undetected targets, the same from
-Python, with a pose of both aircraft for each frame (tracks with other time stamps are
-interpolated first, as `np.interp` does; angles after `np.unwrap`). The mounting turns the
-aircraft's axes (nose, right wing, floor) into the camera's as azimuth, elevation and roll, in
-this order; the focal length and the principal point are in pixels from the upper left corner:
+Python, with a pose of both aircraft for each frame. The mounting turns the aircraft's axes (nose,
+right wing, floor) into the camera's as azimuth, elevation and roll, in this order; the focal
+length and the principal point are in pixels from the upper left corner:
 
 {flown}
 
 **Accuracy.** The rendered area is that of the union of the bodies within 0.3 %. At a noise of
 0.02 of the target's contrast the flow of targets from 4 pixels agrees with the turning line of
-sight within 0.1 pixel, also if the platform's turn moves the whole picture by 139 pixels. Noise
-and clutter reduce this accuracy ([below](#accuracy-of-the-flow)). A spot of fewer than 3 pixels
-has a position and no flow.
+sight within 0.1 pixel ([below](#accuracy-of-the-flow)). A spot of fewer than 3 pixels has a
+position and no flow.
 
 **Limitations.** Only targets are rendered: false alarms are drawn as those of `optical.eo`, and
 clutter makes none. A search for a target that is too faint finds noise instead: through 4 filters

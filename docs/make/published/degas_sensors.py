@@ -48,9 +48,8 @@ sensors are simulated ten times a second and passed on unchanged; ours look once
 tracker in between, which reduces noise and needs some looks. EO/IR reaches no more than 2.5 nmi;
 the radar acquires this intruder at 3.8 nmi, well before an alert is due.
 
-A manoeuvre comes later than without noise if the height of a track is wrong for a while (at 2.5
-nmi a degree is 265 ft, and half a degree of bias 130 ft): then the level falls below corrective,
-and the pilot's delays start again.
+A manoeuvre comes later than without noise if the height of a track is wrong for a while: then the
+level falls below corrective, and the pilot's delays start again.
 """
 
 

@@ -326,8 +326,7 @@ DAIDALUS 5 s after an alert of an aircraft that the pilot has seen for 5 s
 airspace). Of {drawn:,} weighted encounters all NMACs are flown, one in {lost_every} of the other
 losses of well clear, and one in {others_every} of the rest, {encounters} in all, each with as
 many times its weight, and with either aircraft as the ownship that is steered. One pilot: both
-sides together. Both look: the cases that neither prevents alone, which leaves out the effect of
-two manoeuvres at once.
+sides together. Both look: the cases that neither prevents alone.
 
 {risk}
 

@@ -165,10 +165,9 @@ _TAIL = """**Choices.** The bounds are second hand: quoted in comments and const
 [mit-ll/degas-core](https://github.com/mit-ll/degas-core) (`surveillanceLib/SC228_SensorModels`,
 X11); of the radar 125 (R - 1) + 250 ft across, 100 (R - 1) + 150 ft in height, 10 (R - 1) + 50 kt
 and 280 (R - 1) + 800 ft/min. "Cross-track" is taken as across the line of sight, in the
-horizontal. The ownship's position error moves both aircraft alike and is left out; its attitude
-has errors. The encounters are of our made-up airspace (`light_aircraft.txt`), with the default
-densities. The radar acquires slow targets and those off the nose later, so that at 5 and 6 nmi
-many have no track yet.
+horizontal. The ownship's position error is left out; its attitude has errors. The encounters are
+of our made-up airspace (`light_aircraft.txt`). The radar acquires slow targets and those off the
+nose later, so that at 5 and 6 nmi many have no track yet.
 
 One key of the trackers is set, for all of them: a new track may climb at 10 m/s (1 sigma, 2,000
 ft/min: `start_climb_m_s`), whereas by default it is assumed to climb as fast as aircraft fly, 70

@@ -75,6 +75,17 @@ def test_tracks_without_times_are_said(tmp_path):
         read(tmp_path, "a.kml", line)
 
 
+def test_what_stands_beside_a_track_point_s_own_is_not_its(tmp_path):
+    """Times of the file and of extensions, names of points, and prefixes that nobody declared."""
+    of_file = b"<metadata><time>2001-01-01T00:00:00Z</time></metadata><trk>"
+    data = write.gpx({"one": FIXES}).replace(b"<trk>", of_file)
+    inside = b"<name>7</name><extensions><x:time>noon</x:time><x:ele>9</x:ele></extensions></trkpt>"
+    data = data.replace(b"</trkpt>", inside)
+    assert_flown(read(tmp_path, "a.gpx", data).samples["one"], FIXES)
+    first = data.replace(b"<time>2024-06-01T12:00:00Z</time>", b"")
+    assert_flown(read(tmp_path, "a.gpx", first).samples["one"], FIXES[1:])
+
+
 def test_heights_that_are_none_are_said(tmp_path):
     flat = write.gpx({"one": FIXES}).replace(b"ele>", b"x>")
     with pytest.raises(TrafficFileError, match="no samples: all points have no height; time"):
@@ -100,6 +111,7 @@ def test_an_igc_file_as_programs_write_it_again(tmp_path):
     found = read(tmp_path, "a.igc", cut)
     assert_flown(found.samples["TST"], FIXES[:12], deg=2e-5, up_m=30.0)
     assert found.notes.warnings[0] == "1 fix is damaged and left out, the first in line 15"
+    assert list(read(tmp_path, "my.igc", whole.replace(b"TST", b"NKN")).samples) == ["my"]
 
 
 def test_an_igc_file_has_two_heights_and_goes_over_midnight(tmp_path):
