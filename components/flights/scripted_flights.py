@@ -19,7 +19,13 @@ from components.flights.fleet import (
     empty_state,
     evaluate_in_blocks,
 )
-from components.flights.leg_motion import FORMULAS, KINDS, Segment, ramp_velocity
+from components.flights.leg_motion import (
+    FORMULAS,
+    KINDS,
+    LONGEST_FLIGHT_S,
+    Segment,
+    ramp_velocity,
+)
 from components.flights.legs import AnyLeg, LegBuilder, require
 from components.geometry import (
     TrajectoryState,
@@ -30,8 +36,6 @@ from components.geometry import (
 from dsa_des.arrays.growing_arrays import Growing, GrowingArray
 from dsa_des.arrays.types import FloatArray, IntArray
 
-LONGEST_FLIGHT_S = 1e12
-"""Flights are held up to here (30,000 years) and stand still after, so that nothing overflows."""
 MOST_ALT_M = 1e6
 """No flight starts farther above or below the ellipsoid."""
 

@@ -179,7 +179,7 @@ class TrafficSource(Component):
         self.says_truth = truth_is_recorded(self.context, len(self.roster))
         self._fly(self._flights([*asked, *self._steers.values()]), self.roster, [self.p])
         if self.context.producers:
-            self.own = SteeredFlight(self.own, self._flown.own)
+            self.own = SteeredFlight(self.own, self._flown.fleet)
 
     def _index(self, platform: str) -> int:
         """Return which target a platform is; -1 for the ownship."""
@@ -250,7 +250,7 @@ class TrafficSource(Component):
         for number in range(len(parameters)):
             self._check_terrain(partial(_states_of_one, flights.own, number))
         of_all = copy(self)
-        flown = FlownFlights.of(flights.own, flights.targets, [*self._flown.platforms])
+        flown = FlownFlights.of(flights.own, flights.targets, self._flown.platforms)
         of_all._fly(flown, flights.roster, parameters)
         return of_all
 
@@ -282,7 +282,7 @@ class TrafficSource(Component):
     def run(self, wake: Wake) -> Message | None:
         """Return the state of all aircraft that may matter, at every instant."""
         # Flights that all runs share are those of one.
-        run = wake.run if len(self._flown.own) > 1 else runs_of_single(len(wake))
+        run = wake.run if self._flown.runs > 1 else runs_of_single(len(wake))
         time_s = wake.time_s
         known = self._steer(wake, run)
         flown = self._flown
@@ -310,34 +310,36 @@ class TrafficSource(Component):
     def _steer(self, wake: Wake, run: IntArray) -> IntArray:
         """Steer platforms by the manoeuvres that came; return the number known to each row."""
         self._pending = Coming.concatenate([self._pending, *arrived_manoeuvres(wake, self._steers)])
+        flown = self._flown
+        fleet, runs = flown.fleet, flown.runs
+        each = run[:, np.newaxis] + runs * np.arange(len(flown.platforms))
         if not len(self._pending):
-            counts = [fleet.manoeuvre_count[run] for fleet in self._flown.platforms.values()]
-            return np.array(counts).T
+            return fleet.manoeuvre_count[each]
         due, self._pending = due_manoeuvres(wake, self._pending)
-        platforms, known = dict(self._flown.platforms), []
-        for platform, fleet in platforms.items():
-            mine = due.take(due.platform == platform)
-            if platform >= 0:  # who is not there is not steered
-                from_s, until_s = fleet.nominal.intervals_present_s[mine.replica].T
-                time_s = mine.tick / wake.ticks_per_s
-                mine = mine.take((from_s <= time_s) & (time_s <= until_s))
-            platforms[platform], count = steer(fleet, mine, wake, run)
-            known.append(count)
-            for view in self._views:
-                if view.viewer == platform and view.epochs is not None:
-                    for run_of, tick in zip(mine.replica.tolist(), mine.tick.tolist(), strict=True):
-                        view.epochs.forget(run_of, tick / wake.ticks_per_s)
-        self._flown = replace(self._flown, platforms=platforms)
+        flights = np.searchsorted(flown.platforms, due.platform) * runs + due.replica
+        time_s = due.tick / wake.ticks_per_s
+        there = due.platform < 0
+        if not there.all():  # who is not there is not steered; the ownship always is
+            from_s, until_s = fleet.nominal.intervals_present_s[flights].T
+            there |= (from_s <= time_s) & (time_s <= until_s)
+            due, flights = due.take(there), flights[there]
+        fleet, known = steer(fleet, flights, due, wake, each)
+        for view in self._views:
+            if view.epochs is not None:
+                mine = due.take(due.platform == view.viewer)
+                for run_of, tick in zip(mine.replica.tolist(), mine.tick.tolist(), strict=True):
+                    view.epochs.forget(run_of, tick / wake.ticks_per_s)
+        self._flown = replace(flown, fleet=fleet)
         assert isinstance(self.own, SteeredFlight)
-        self.own = SteeredFlight(self.own.flight, self._flown.own)
+        self.own = SteeredFlight(self.own.flight, fleet)
         self.targets = self._flown.as_flown()
-        return np.stack(known, axis=1)
+        return known
 
     def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return the states (rows, columns) of targets of each row's run."""
         flown, shape = self._flown, (len(time_s), len(columns))
         state: TrajectoryState | None = None
-        if len(flown.own) == 1:
+        if flown.runs == 1:
             if not np.array_equal(columns, self._moved[0]):
                 self._moved = columns, flown.targets.subset(columns)
             state = self._moved[1].at(time_s)
@@ -376,7 +378,7 @@ class TrafficSource(Component):
         own, targets, names = self.own, self.targets, [*self.roster.names]
         if viewer >= 0:  # it and the ownship change places
             own, names[viewer] = targets[viewer], self.roster.own_name
-            targets = WithOthers(targets, len(targets), {viewer: self._flown.own})
+            targets = WithOthers(targets, len(targets), {viewer: self._flown.of_platform(-1)})
         times = self._compared_at(end_s)
         between = not self._seeks_at_samples
         best = approaches_of_run(own, targets, times, end_s, between=between)

@@ -70,9 +70,10 @@ class View:
         """Return the state of the ownship, if it looks, at each row, which targets may come in the
         reach of who looks, and when (rows, targets); None for always.
         """
-        every, lasts_s, one_run = np.arange(self._width), self.look.lasts_s, len(flown.own) == 1
+        every, lasts_s, one_run = np.arange(self._width), self.look.lasts_s, flown.runs == 1
         if self.epochs is not None:
-            state, near = self.epochs.states_and_near(flown.platforms[self.viewer], run, time_s)
+            looking = flown.of_platform(self.viewer)
+            state, near = self.epochs.states_and_near(looking, run, time_s)
             near[:, self._steered] = True
             columns = np.flatnonzero(near.any(axis=0)) if one_run else every
             return self._own(flown, run, time_s, state), columns, near[:, columns]
