@@ -1,5 +1,6 @@
 """``plan.png``: the run from above, altitudes below it, and where each sensor detected what."""
 
+import textwrap
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ from dsa_des.running.simulation import Simulation
 
 # Inches around the map.
 _LEFT_IN, _BOTTOM_IN, _TOP_IN, _LEGEND_IN = 0.75, 0.55, 0.35, 2.35
+_LEGEND_LETTERS = 34  # of a line beside the map
 # The panel of altitudes below it, and what is between the two.
 _ALTITUDES_IN, _BETWEEN_IN = 1.15, 0.62
 
@@ -291,7 +293,11 @@ def _legend(
         label = figure_text(name, 24)
         if name in carrying:
             label += f" on {figure_text(carrying[name], 16)}"
-        text = f"{label}: {count:,} detections" if count else f"{label}: no detections"
+        # A number stays with what it counts.
+        text = textwrap.fill(
+            f"{label}: {f'{count:,}' if count else 'no'}\N{NO-BREAK SPACE}detections",
+            _LEGEND_LETTERS,
+        )
         if drawn[name] < count:
             text += f"\n({drawn[name]:,} of them marked)"
         if name in reaches:

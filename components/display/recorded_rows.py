@@ -1,6 +1,6 @@
 """A run's tables read for figures, row group by row group: no table is ever in memory as a whole.
 
-Detections are thinned where they are many; of scans each sensor's count, times and first hit are
+Detections are thinned where they are many; of scans each sensor's first times and first hit are
 kept, and single scans of a part of the run.
 """
 
@@ -20,6 +20,8 @@ from dsa_des.block.message import Text
 MOST_ROWS = 400_000
 """More detections than this are thinned when they are read, those of long series first."""
 
+#: So many scans of a sensor tell from when to when it usually is.
+_FIRST_SCANS = 1000
 #: Columns that are read as codes and names.
 TEXT = ("block", "target", "sensors", "track_status")
 _SCANS = ("block", "time_s", "detected")
@@ -178,26 +180,27 @@ def index_in_groups(group: IntArray) -> IntArray:
 
 @dataclass
 class SensorScans:
-    """All scans of a sensor: count, first and last, and the first with a detection."""
+    """The times of a sensor's first `_FIRST_SCANS` scans, and the first of all with a detection."""
 
-    count: int
-    first_s: float
-    last_s: float
+    first_s: FloatArray
     first_hit_s: float | None
 
     @property
     def period_s(self) -> float | None:
-        """Mean time from scan to scan; None for a single scan."""
-        if self.count < 2:
-            return None
-        return (self.last_s - self.first_s) / (self.count - 1)
+        """Time from scan to scan; None for a single scan."""
+        return scan_period_s(self.first_s)
 
-    @property
-    def rate_hz(self) -> float | None:
-        """Mean number of scans per second; None where all are at one time."""
-        if self.last_s <= self.first_s:
-            return None
-        return (self.count - 1) / (self.last_s - self.first_s)
+
+def scan_period_s(time_s: FloatArray) -> float | None:
+    """Return the time from scan to scan; None where all are at one time.
+
+    It is the mean of the usual steps: a sensor that is out for a while scans no slower.
+    """
+    steps_s = np.diff(np.unique(time_s))
+    if not len(steps_s):
+        return None
+    usual_s = np.sort(steps_s)[(len(steps_s) - 1) // 2]
+    return float(steps_s[steps_s <= 1.5 * usual_s].mean())
 
 
 @dataclass
@@ -213,10 +216,9 @@ def read_scans(folder: Path) -> dict[str, SensorScans]:
     result: dict[str, SensorScans] = {}
     for rows in iterate_row_groups(folder / "scans.parquet", _SCANS):
         for name, (time_s, hit_s) in _times_by_sensor(rows).items():
-            first, last = float(time_s[0]), float(time_s[-1])
-            scans = result.setdefault(name, SensorScans(0, first, last, None))
-            scans.count += len(time_s)
-            scans.last_s = last
+            scans = result.setdefault(name, SensorScans(time_s[:0], None))
+            if len(scans.first_s) < _FIRST_SCANS:
+                scans.first_s = np.concatenate([scans.first_s, time_s])[:_FIRST_SCANS]
             if scans.first_hit_s is None and len(hit_s):
                 scans.first_hit_s = float(hit_s[0])
     return dict(sorted(result.items()))

@@ -16,6 +16,7 @@ from components.display.recorded_rows import (
     SensorScans,
     read_fused,
     read_scans,
+    scan_period_s,
     scans_between,
 )
 from components.display.symbols import (
@@ -158,9 +159,11 @@ def _draw_scans(
     for name in sensors:
         here = shown.get(name, nothing)
         style = styles[name]
-        rate_hz = scans[name].rate_hz if name in scans else None
+        period_s = scans[name].period_s if name in scans else None
+        if len(here.time_s) > 2:  # the rate may change while a run lasts
+            period_s = scan_period_s(here.time_s)
         label = figure_text(name, 16)
-        names.append(f"{label}\n{rate_hz:.4g} Hz" if rate_hz else label)
+        names.append(f"{label}\n{1.0 / period_s:.4g} Hz" if period_s else label)
         size = min(7.0, _mark_size(len(here.time_s)))
         axes.plot(
             here.time_s, np.full(len(here.time_s), height[name]), linestyle="none", marker="|",
@@ -210,14 +213,15 @@ def _draw_scans(
 
 def _draw_times_out(axes: Any, out_s: Mapping[str, FloatArray], styles: Mapping[str, Mark]) -> str:
     """Draw a bar at the foot wherever a sensor was out, and return what the title says of it."""
-    failed = [name for name in styles if len(out_s.get(name, ()))]
-    for number, name in enumerate(failed):
+    out = [name for name in styles if len(out_s.get(name, ()))]
+    for number, name in enumerate(out):
         from_s, to_s = out_s[name].T
         axes.broken_barh(
             np.column_stack((from_s, to_s - from_s)), (0.005 + 0.025 * number, 0.02),
             color=styles[name].colour, transform=axes.get_xaxis_transform(), zorder=4.0, label=name,
         )  # fmt: skip
-    return f"; bars: {', '.join(figure_text(name, 16) for name in failed)} out" if failed else ""
+    names = ", ".join(figure_text(name, 16) for name in out)
+    return f"; bars: {names} off or failed" if out else ""
 
 
 def _mark_size(count: int) -> float:

@@ -33,6 +33,10 @@ class NoSuchFile(InputFileError):
     """There is no file of that name."""
 
 
+class NotText(InputFileError):
+    """A file holds something else than text in UTF-8."""
+
+
 def resolve_home(text: str) -> Path:
     """Return a path with ``~`` at its start resolved."""
     if "\0" in text:
@@ -85,9 +89,9 @@ def read_input_text(path: Path, largest_bytes: int = LARGEST_BYTES) -> str:
     try:
         text = read_input_bytes(path, largest_bytes).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputFileError("is not a text file in UTF-8") from None
+        raise NotText("is not a text file in UTF-8") from None
     if "\0" in text:
-        raise InputFileError("is not a text file: it holds NUL characters")
+        raise NotText("is not a text file: it holds NUL characters")
     return text.replace("\r\n", "\n")
 
 

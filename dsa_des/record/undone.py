@@ -17,7 +17,7 @@ UndoneByRun = Mapping[str, Mapping[str, IntArray]]
 NO_RUNS: IntArray = np.empty(0, dtype=np.int64)
 NO_COUNTS: IntArray = np.zeros((2, 0), dtype=np.int64)
 #: What is counted of a block that fails at random. It is said however seldom.
-SECONDS_OUT = "seconds out"
+SECONDS_FAILED = "seconds failed"
 #: Smaller shares are not worth a sentence: a flight is not known at its first position.
 _LEAST_SHARE = 0.1
 
@@ -83,7 +83,7 @@ def undone_sentences(undone: Undone) -> list[str]:
         f"{block}: {what}: {times:,} of {of:,} ({_percent(times / of)})"
         for block, counts in undone.items()
         for what, (times, of) in counts.items()
-        if times > 0 and (what == SECONDS_OUT or times >= _LEAST_SHARE * of)
+        if times > 0 and (what == SECONDS_FAILED or times >= _LEAST_SHARE * of)
     ]
 
 

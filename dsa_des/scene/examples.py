@@ -29,10 +29,10 @@ def find_input_file(asked: Path | str, kind: Kind | None = None) -> Path:
     if shipped is not None:
         return shipped
     # A name that no file system takes is refused where it is opened.
-    if len(path.parts) == 1 and len(path.name) <= 255 and not _has_neighbour(path):
+    if not path.is_absolute() and len(path.name) <= 255 and not _has_neighbour(path):
         names = [example.name for example in examples() if kind in (None, example.kind)]
         close = nearest(path.name.removesuffix(".toml"), names)
-        if close or not path.suffix:
+        if close or (len(path.parts) == 1 and not path.suffix):
             message = (
                 f"there is no such file, nor a shipped {kind or 'scene or study'} of that name"
             )
@@ -44,9 +44,9 @@ def find_input_file(asked: Path | str, kind: Kind | None = None) -> Path:
 
 
 def _has_neighbour(path: Path) -> bool:
-    """Return whether a file (no folder) of nearly this name lies in the working directory."""
+    """Return whether a file (no folder) of nearly this name lies in its folder."""
     try:
-        files = [entry.name for entry in os.scandir() if entry.is_file()]
+        files = [entry.name for entry in os.scandir(path.parent) if entry.is_file()]
         return nearest(path.name, files) is not None
     except OSError:
         return False

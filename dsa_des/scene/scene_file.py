@@ -20,6 +20,7 @@ from dsa_des.files.input_files import (
     LARGEST_TOML_BYTES,
     InputFileError,
     NoSuchFile,
+    NotText,
     is_folder,
     is_regular_file,
     read_input_text,
@@ -145,7 +146,8 @@ class _Reader:
         elif is_folder(path):
             message = f"{f'{name} ' if chain else ''}is a folder; a TOML file is needed"
         else:
-            message = f"{name} {tables}"
+            message = f"{f'{name} ' if chain else ''}{tables}"
+            message += "; a TOML file is needed" if isinstance(tables, NotText) else ""
         if at or chain:
             source, key = self.sources.get(at, str(chain[-1])), dotted_key((*at, "extends"))
             self.problems.append(Problem(source, key, message))

@@ -8,7 +8,7 @@ from dsa_des.arrays.run_ticks import RunTicks, last_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import SECONDS_OUT
+from dsa_des.record.undone import SECONDS_FAILED
 from dsa_des.stretches.outage import Outage
 from dsa_des.time.randomness import Streams
 from dsa_des.time.runs import Runs
@@ -116,12 +116,12 @@ class Outages:
         return merge_spans(spans.reshape(-1, 2), int(self._runs.ends[run]))
 
     def undone(self) -> Mapping[str, IntArray]:
-        """Return of how many seconds of each run the block was out, as counts (2, runs)."""
+        """Return how many seconds of each run the block had failed, as counts (2, runs)."""
         ends = self._runs.ends
         each = map(self.spans, range(self._runs.count))
         out = [int((spans[:, 1] - spans[:, 0]).sum()) for spans in each]
         seconds = np.rint(np.array([out, ends]) / self._ticks_per_s).astype(np.int64)
-        return {SECONDS_OUT: seconds}
+        return {SECONDS_FAILED: seconds}
 
 
 def _is_in_outage(edges: RunTicks, instants: RunTicks) -> BoolArray:

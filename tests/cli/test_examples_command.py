@@ -105,6 +105,7 @@ def test_a_path_that_exists_wins(call: Call, tmp_path: Path) -> None:
     [
         (("run", "frist_light"), "'first_light'"),
         (("check", "first_ligth.toml"), "'first_light'"),
+        (("run", "platforms/ground_rada"), "'ground_radar'"),
         (("study", "radar_scanrate"), "'radar_scan_rate'"),
         (("compare", "frist_light", "--swap", "gate=gate"), "'first_light'"),
         (("evidence", "noncoperative", "--out", "pack"), "'noncooperative'"),

@@ -16,7 +16,9 @@ from matplotlib.patches import Polygon
 from scipy.stats import chi2
 
 import dsa_des
+from components.display import plan
 from components.display.map_view import MAP_WIDTH_IN, draw_outline, outline_of
+from components.display.recorded_rows import Detected, scan_period_s
 from components.display.report import DetectAndSenseReport
 from components.messages.reach import Reach
 from components.sensor.marks import EO, RADAR
@@ -514,8 +516,21 @@ def test_bars_show_when_sensors_were_out(tmp_path, monkeypatch):
     )
     words = ["run", "radar_outage", "--out", str(tmp_path / "run"), "--quiet"]
     assert CliRunner().invoke(main, words).exit_code == 0  # off from 30 s to 50 s
-    below = figures[-1].axes[1]
+    above, below = figures[-1].axes[:2]
+    # It scans no slower for being off: its mean over the run would be 4.2 Hz.
+    rates = dict(tick.get_text().split("\n") for tick in above.get_yticklabels())
+    assert rates["radar"] == "5 Hz" == f"{1 / scan_period_s(np.r_[0:30:0.2, 50:60:0.2]):.4g} Hz"
     bars = {of.get_label(): of.get_paths() for of in below.collections if of.get_label() == "radar"}
     (bar,) = bars["radar"]
     assert bar.vertices[:, 0].min() == 30 and bar.vertices[:, 0].max() == 50
-    assert "bars: radar out" in below.get_title(loc="left")
+    assert "bars: radar off or failed)" in below.get_title(loc="left")
+
+
+def test_legends_beside_the_map_end_within_the_picture():
+    """They ran off its right edge where sensors are on several platforms."""
+    none = {"radar_b": np.empty(0)}
+    detected = Detected(["radar_b"], none, none, {}, [], {"radar_b": RADAR})
+    counts = {"sensors": {"radar_b": {"detections": 1026}}}
+    handles = plan._legend({}, detected, {"radar_b": 1026}, counts, {"radar_b": "head_on"}, False)
+    said = handles[-1].get_label().replace("\N{NO-BREAK SPACE}", " ")
+    assert said == "radar_b on head_on:\n1,026 detections"

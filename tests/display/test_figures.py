@@ -194,7 +194,7 @@ def test_the_close_up_prefers_the_largest_combination(tmp_path):
     rows = [(1.0, "a+b"), (2.0, "a"), (3.0, "a+b+c"), (3.5, "a+c"), (9.0, "a+b+c")]
     table = {"time_s": [row[0] for row in rows], "sensors": [row[1] for row in rows]}
     pq.write_table(pa.table(table), tmp_path / "fused.parquet", row_group_size=2)
-    scans = {name: SensorScans(20, 0.0, 9.5, 0.0) for name in "abc"}
+    scans = {name: SensorScans(np.arange(0.0, 10.0, 0.5), 0.0) for name in "abc"}
     close_up = find_close_up(scans, tmp_path, 10.0)
     assert close_up.what.endswith("three sensors")
     assert close_up.start_s < 3.0 < close_up.end_s < 9.0

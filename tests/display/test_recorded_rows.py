@@ -110,7 +110,7 @@ def test_scans_are_found_as_by_looking_at_all(tmp_path_factory, rows, start_s, l
     for name, one in scans.items():
         mine = time_s[block == name]
         hits = time_s[(block == name) & hit]
-        assert (one.count, one.first_s, one.last_s) == (len(mine), mine[0], mine[-1])
+        assert one.first_s.tolist() == mine.tolist()
         assert one.first_hit_s == (hits[0] if len(hits) else None)
         inside = (mine >= start_s) & (mine <= start_s + length_s)
         assert shown[name].time_s.tolist() == mine[inside].tolist()
@@ -165,7 +165,7 @@ def drawn(folder, groups):
     shown = scans_between(folder, 50.0, 60.0, scans)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert scans["radar"].count == groups * 4000
+    assert len(scans["radar"].first_s) == 1000 and round(scans["radar"].period_s or 0, 9) == 0.1
     assert len(shown["radar"].time_s) == 101
     assert len(detected.time_s["radar"]) <= recorded_rows.MOST_ROWS
     return peak

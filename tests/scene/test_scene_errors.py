@@ -391,7 +391,9 @@ def test_what_is_no_toml(lab):
     assert "broken.toml: is not valid TOML: " in message(folder / "broken.toml")
     assert "a scene needs at least one block" in message(folder / "empty.toml")
     (folder / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    assert "is not a text file in UTF-8" in message(folder / "binary.toml")
+    assert message(folder / "binary.toml") == (
+        f"{folder / 'binary.toml'}: is not a text file in UTF-8; a TOML file is needed"
+    )
 
 
 def test_a_missing_base_names_the_file_that_wants_it(lab):

@@ -106,11 +106,11 @@ def test_what_fails_together_is_out_together_and_draws_by_its_name():
     assert (radar == tracker).all()
     other, _ = tables_of(scene(outages=[outage("radar", name="other")]))
     assert not np.array_equal(spans_s(other.timeline.outages("radar")), radar)
-    said = simulation.timeline.outages("radar").undone()["seconds out"]
+    said = simulation.timeline.outages("radar").undone()["seconds failed"]
     out_s = sum(np.minimum(last, 40e9) - np.minimum(first, 40e9) for first, last in radar) / 1e9
     assert said.tolist() == [[round(out_s)], [40]]
-    assert undone_sentences({"radar": {"seconds out": (3, 600)}}) == [
-        "radar: seconds out: 3 of 600 (0.5 %)"
+    assert undone_sentences({"radar": {"seconds failed": (3, 600)}}) == [
+        "radar: seconds failed: 3 of 600 (0.5 %)"
     ]  # though a block that lacks something so seldom is not worth a sentence
 
 
