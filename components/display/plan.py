@@ -45,7 +45,7 @@ from dsa_des.running.simulation import Simulation
 
 # Inches around the map.
 _LEFT_IN, _BOTTOM_IN, _TOP_IN, _LEGEND_IN = 0.75, 0.55, 0.35, 2.35
-_LEGEND_LETTERS = 34  # of a line beside the map
+_LEGEND_LETTERS = 30  # of a line beside the map
 # The panel of altitudes below it, and what is between the two.
 _ALTITUDES_IN, _BETWEEN_IN = 1.15, 0.62
 
@@ -294,10 +294,8 @@ def _legend(
         if name in carrying:
             label += f" on {figure_text(carrying[name], 16)}"
         # A number stays with what it counts.
-        text = textwrap.fill(
-            f"{label}: {f'{count:,}' if count else 'no'}\N{NO-BREAK SPACE}detections",
-            _LEGEND_LETTERS,
-        )
+        text = f"{label}: {f'{count:,}' if count else 'no'}\N{NO-BREAK SPACE}detections"
+        text = textwrap.fill(text, _LEGEND_LETTERS).replace("\N{NO-BREAK SPACE}", " ")
         if drawn[name] < count:
             text += f"\n({drawn[name]:,} of them marked)"
         if name in reaches:
