@@ -28,7 +28,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 
 _KINDS = {"turn": "hdir", "climb": "alt", "speed": "hs", "vertical_speed": "vs"}
 # Where the configuration has manoeuvres take no time, they are flown so fast: 3 deg/s, 500 ft/min,
@@ -67,13 +67,15 @@ class TurnOutParameters(ConfParameters):
         default=Fraction(10), description="What another one has told counts for so long, s."
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to manoeuvres that are not chosen."""
         used = {"turn": "beyond_deg", "climb": "beyond_m"}.get(self.manoeuvre, "beyond_mps")
         keys = {"beyond_deg", "beyond_m", "beyond_mps"} - {used}
         because = f"manoeuvre is '{self.manoeuvre}'"
-        said = super().without_effect() + self.idle(*sorted(keys), because=because)
-        alone = self.idle("heeds_s", because="address is not given")
+        said = super().ineffective_key_notes() + self.note_ineffective(
+            *sorted(keys), because=because
+        )
+        alone = self.note_ineffective("heeds_s", because="address is not given")
         return said if self.address is not None else said + alone
 
 
@@ -141,7 +143,7 @@ class TurnOut(Component):
         """Say which address it has."""
         return self.p.address
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how often it was to steer, and no change led clear."""
         return {"no change leads clear and the ownship is left alone": self._stuck}
 
@@ -182,7 +184,7 @@ class TurnOut(Component):
                 change = None if changes is None else self._choose(run, tick, changes)
                 if changes is not None and self._is_free(run, tick):
                     due = np.array([run])
-                    self._stuck = with_cases(self._stuck, due[: change is None], due)
+                    self._stuck = count_cases(self._stuck, due[: change is None], due)
                 if change is not None:
                     manoeuvres[index] = self._manoeuvre(change)
                     self._free_from[run] = tick + self._pause_ticks
@@ -311,12 +313,12 @@ class TurnAwayParameters(Parameters):
         default=Fraction(60), description="Shortest time from one manoeuvre to the next, s."
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say that a bank leaves no rate to choose."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.bank_deg is None:
             return said
-        return said + self.idle("rate_deg_s", because="bank_deg is given")
+        return said + self.note_ineffective("rate_deg_s", because="bank_deg is given")
 
 
 class TurnAway(Component):
@@ -354,7 +356,7 @@ class TurnAway(Component):
             return []
         return [f"without_range is false and {blind} measures no range: it never turns"]
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how many tracks had no range and were not acted on."""
         return (
             {}
@@ -371,7 +373,7 @@ class TurnAway(Component):
         row = tracks.row_of_entries
         rangeless = np.isnan(tracks.range_m)
         of = take_runs(tracks.run, row)
-        self._rangeless = with_cases(self._rangeless, take_runs(of, rangeless.nonzero()[0]), of)
+        self._rangeless = count_cases(self._rangeless, take_runs(of, rangeless.nonzero()[0]), of)
         if self.p.without_range:
             near |= rangeless
         manoeuvres: dict[int, Manoeuvre] = {}

@@ -23,7 +23,7 @@ from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import with_cases
+from dsa_des.record.failure_counts import count_cases
 
 # Upper triangle of a covariance in its columns.
 _PAIRS = tuple(COVARIANCE)
@@ -64,7 +64,7 @@ class EstimatedFlights:
         """Take in tracks of a tracker, and when each row came."""
         good = np.isin(tracks.track_status, (CONFIRMED, COASTED))
         run = came.run[row_of_entries(tracks.offsets)]
-        self.rangeless = with_cases(self.rangeless, run[good & ~tracks.has_range], run[good])
+        self.rangeless = count_cases(self.rangeless, run[good & ~tracks.has_range], run[good])
         good &= tracks.has_range
         before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
         begin = len(self._tracks) + before[:-1]
@@ -195,7 +195,7 @@ class BelievedTracks:
         #: At how many scans the ownship's velocity is not known yet, of how many, by run.
         self._unmoving = np.zeros((2, 0), dtype=np.int64)
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how often something could not be judged, by run."""
         return count_not_judged(self._estimates.rangeless, self._unmoving)
 
@@ -221,7 +221,7 @@ class BelievedTracks:
         # Without two poses the ownship's own velocity is not known, and no relative one.
         known = np.isfinite(own["east_mps"])
         moving = known.nonzero()[0]
-        self._unmoving = with_cases(self._unmoving, asked.run[~known], asked.run)
+        self._unmoving = count_cases(self._unmoving, asked.run[~known], asked.run)
         now = asked.take(moving)
         east, north, climb = (own[name][moving] for name in _OWN_VELOCITY)
         velocity_m_s = np.stack([north, east, -climb])

@@ -150,9 +150,9 @@ class DaidalusAlerting(Component):
             said.append(f"{blind} measures no range: nothing of what it hears of is judged")
         return said
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how often a flight could not be judged, by run."""
-        return {} if self._roster is None else self._belief.undone()
+        return {} if self._roster is None else self._belief.failure_counts()
 
     def run(self, wake: Wake) -> AlertLevels | None:
         """Take in what came, and give the levels at each scan."""

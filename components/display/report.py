@@ -59,7 +59,7 @@ class DetectAndSenseReport:
         """Return what changed from one run's recorded tables to another's."""
         return compare_runs(reference, other)
 
-    def remarks(self, changes: Mapping[str, Any]) -> list[str]:
+    def describe_changes(self, changes: Mapping[str, Any]) -> list[str]:
         """Return which targets a sensor no longer sees at all."""
         missed = changes.get("never_detected")
         return [f"never sees {', '.join(missed)}"] if missed else []

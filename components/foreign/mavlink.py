@@ -182,7 +182,7 @@ class Mavlink(Component):
         blind = without_range(one for one in self.context.producers if one.port == "estimates")
         return [f"{blind} measures no range: no track is sent"] if blind else []
 
-    def undone(self) -> dict[str, tuple[int, int]]:
+    def failure_counts(self) -> dict[str, tuple[int, int]]:
         """Return how many tracks had no range and were not sent."""
         if not self._heard:
             return {}

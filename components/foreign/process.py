@@ -102,13 +102,15 @@ class ProcessParameters(Parameters):
         beside = Path(self.folder or ".") / name
         return shutil.which(str(beside.absolute()) if "/" in name else name)
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys change nothing."""
-        said = [] if self.on_failure == "restart" else self.idle(
+        said = [] if self.on_failure == "restart" else self.note_ineffective(
             "most_restarts", because='as on_failure is "stop"'
         )  # fmt: skip
         return said + (
-            [] if self.scan_rate_hz else self.idle("offset_s", because="without scan_rate_hz")
+            []
+            if self.scan_rate_hz
+            else self.note_ineffective("offset_s", because="without scan_rate_hz")
         )
 
 
@@ -272,7 +274,7 @@ class Process(Component):
                 self._roster = found
         return self._roster or Roster.from_pairs([])
 
-    def undone(self) -> dict[str, tuple[int, int]]:
+    def failure_counts(self) -> dict[str, tuple[int, int]]:
         """Return how often it was asked, where it never had anything to say."""
         if self._answers or not self._calls:
             return {}

@@ -21,7 +21,7 @@ from dsa_des.block.component import Component, Input, Output, Producer
 from dsa_des.block.ladder import Verified
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import Tries, has_two_bits
+from dsa_des.record.failure_counts import Tries, has_two_bits
 
 #: What the sensor that gives the angles also says, and all numbers of a fused row.
 _ANGLES = (
@@ -111,11 +111,11 @@ class Fusion(Component):
             for one in self.context.producers
         }
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return the runs in which it never fused detections of two sensors."""
         if not self.puts_together:
             return {}
-        return self._tries.undone(
+        return self._tries.failure_counts(
             "two sensors or more detect, and it never puts two of them together", of_two=True
         )
 

@@ -43,7 +43,7 @@ class PickBest(Fusion):
     Parameters = PickBestParameters
     ladders = (FUSION_LADDER,)
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Say what decides here which detections belong together."""
         return [
             "association by truth: detections of the same target are put together, whatever was "

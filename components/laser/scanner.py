@@ -111,9 +111,9 @@ class LaserParameters(RangeErrorParameters, SensorParameters):
             )
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say that a single shot needs no pattern."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.pattern == "one_shot" and self.hits_needed > 1:
             said.append("hits_needed is more than the one shot of a scan: nothing is detected")
         return said

@@ -262,7 +262,7 @@ class Declaration(TargetMetric):
             values[f"declaration_cut_off.{name}"] = cut
         return values
 
-    def expected(self, scene: Scene) -> Mapping[str, float]:
+    def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
         """Return scan period × (m - 1): the delay where every scan detects."""
         values: dict[str, float] = {}
         for name in self.sensors:

@@ -88,7 +88,7 @@ class FusedShare(TargetMetric):
             values |= with_trials(_name(a, b), successes, trials)
         return values
 
-    def expected(self, scene: Scene) -> Mapping[str, float]:
+    def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
         """Return the share of two periodic clocks, if every scan detects.
 
         Exact clocks are counted in rational numbers, in the long run; of clocks that jitter or

@@ -85,11 +85,11 @@ class ImageParameters(ElectroOpticalParameters):
             )
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to a texture that there is not."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if not self.texture_contrast:
-            said += self.idle("texture_pixels", because="texture_contrast is 0")
+            said += self.note_ineffective("texture_pixels", because="texture_contrast is 0")
         return said
 
 

@@ -134,17 +134,17 @@ class RadarParameters(ResolutionParameters):
         "heavy rain to 30 in drizzle (assumption).",
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to a filter, or to a circular polarisation, that there is not."""
-        said, kind = super().without_effect(), self.moving_target_filter
+        said, kind = super().ineffective_key_notes(), self.moving_target_filter
         because = f"moving_target_filter is '{kind}'"
         if kind != "filter_bank":
-            said += self.idle("filter_pulses", because=because)
+            said += self.note_ineffective("filter_pulses", because=because)
         if kind == "none":
-            said += self.idle("clutter_lock", "improvement_limit_db", because=because)
+            said += self.note_ineffective("clutter_lock", "improvement_limit_db", because=because)
         if self.polarisation != "circular":
             because = f"polarisation is '{self.polarisation}'"
-            said += self.idle("rain_rejection_db", because=because)
+            said += self.note_ineffective("rain_rejection_db", because=because)
         return said
 
     @model_validator(mode="after")
@@ -292,11 +292,11 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
         description="Whether a sweeping beam visits cue cones as a scan begins, and then sweeps.",
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to errors by signal, where there are none."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.errors != "signal":
-            said += self.idle("angle_measurement", because=f"errors is '{self.errors}'")
+            said += self.note_ineffective("angle_measurement", because=f"errors is '{self.errors}'")
         return said
 
     @model_validator(mode="after")

@@ -111,12 +111,14 @@ class SwerlingParameters(LinkBudgetParameters):
         self._check_cued()
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to a fluctuation that there is not."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.swerling in (0, 5):
             fading = "fluctuation_correlation_s", "scintillation_extent_m"
-            said += self.idle(*fading, because=f"swerling is {self.swerling}: nothing fluctuates")
+            said += self.note_ineffective(
+                *fading, because=f"swerling is {self.swerling}: nothing fluctuates"
+            )
         return said
 
     def _check_cued(self) -> None:
@@ -180,9 +182,9 @@ class SwerlingRadar(LinkBudgetRadar):
         if self.p.detection == "exact":
             self._method = self.built_one(PD_METHOD) or "table"
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Say which method of Pd was picked, and why, if the scene asks for that."""
-        said = [*super().left_out(), *noise_at_targets(self.p)]
+        said = [*super().skipped_work_notes(), *noise_at_targets(self.p)]
         return said if self.p.model is None else [*said, *method_reasons(self, self._method)]
 
     def warnings(self) -> list[str]:

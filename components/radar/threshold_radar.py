@@ -274,9 +274,9 @@ class LinkBudgetRadar(Radar):
         )
         return float(10.0 * np.log10(snr))
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Say what the air would take that the scene leaves out, and where echoes are ambiguous."""
-        said = [*super().left_out(), *gas_left_out(self)]
+        said = [*super().skipped_work_notes(), *gas_left_out(self)]
         if self.p.prf_hz is not None and self.p.range_km is None and not self.p.range_folds:
             range_km = self.stated_reach.range_max_m / 1000.0
             said.append(

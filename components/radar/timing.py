@@ -127,14 +127,16 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
             self._check_scan_rate(beams)
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to a budget of time, or to beams, that there are not."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.budget != "dwell":
             because = f"budget is {'not given' if self.budget is None else repr(self.budget)}"
-            said += self.idle("integration", because=because)
+            said += self.note_ineffective("integration", because=because)
         if self.azimuth_beamwidth_deg is None:
-            said += self.idle("beam_spacing", because="azimuth_beamwidth_deg is not given")
+            said += self.note_ineffective(
+                "beam_spacing", because="azimuth_beamwidth_deg is not given"
+            )
         return said
 
     @property

@@ -16,7 +16,7 @@ from dsa_des.arrays.column_values import take_rows
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.wake import Wake
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 
 #: The input over which they come.
 PORT = "cues"
@@ -45,7 +45,7 @@ class ConesAhead:
         #: Scans at which all cones had run out, of those that had any.
         self._old = NO_COUNTS
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return at how many scans no cone counted any more, by run."""
         return {"the cues that it has are older than their lasts_s": self._old}
 
@@ -68,7 +68,7 @@ class ConesAhead:
         cued = counts > 0
         old = cued & (np.bincount(scan[live], minlength=len(counts)) == 0)
         run = wake.run
-        self._old = with_cases(self._old, run[old], run[cued])
+        self._old = count_cases(self._old, run[old], run[cued])
         scan, entry, time_s = scan[live], entry[live], time_s[live]
         if len(scan) == 0:
             return None

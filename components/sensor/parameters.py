@@ -111,14 +111,14 @@ class ErrorParameters(ClockedParameters):
         Disagreements.refuse(wrong)
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to errors that there are not."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.errors == "grid":
-            return said + self.idle("quantised", "biases", because="errors is 'grid'")
+            return said + self.note_ineffective("quantised", "biases", because="errors is 'grid'")
         biases = [self._keys(name, unit)[1] for name, unit in self.quantities.items()]
         if not any(getattr(self, key) for key in biases):
-            said += self.idle("biases", because=f"none of {', '.join(biases)} is given")
+            said += self.note_ineffective("biases", because=f"none of {', '.join(biases)} is given")
         return said
 
     @staticmethod
@@ -178,15 +178,15 @@ class GlintParameters(ErrorParameters):
         default=0.2, description="Time after which that has forgotten all but 1/e, s."
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to a wander that there is not."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.errors != "signal":
-            return said + self.idle(
+            return said + self.note_ineffective(
                 "glint_share", "glint_correlation_time_s", because=f"errors is '{self.errors}'"
             )
         if not self.glint_share:
-            said += self.idle("glint_correlation_time_s", because="glint_share is 0")
+            said += self.note_ineffective("glint_correlation_time_s", because="glint_share is 0")
         return said
 
 
@@ -306,13 +306,17 @@ class SensorParameters(ErrorParameters):
                 ) from error
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to a rule of declaration that there is not."""
-        said, places = super().without_effect(), ("declare_speed_m_s", "declare_rate_deg_s")
+        said, places = super().ineffective_key_notes(), ("declare_speed_m_s", "declare_rate_deg_s")
         if self.declare_m is None:
-            return said + self.idle("declare_by", *places, because="declare_m is not given")
+            return said + self.note_ineffective(
+                "declare_by", *places, because="declare_m is not given"
+            )
         if self.declares_by == "target":
-            said += self.idle(*places, because="looks at targets are counted (declare_by)")
+            said += self.note_ineffective(
+                *places, because="looks at targets are counted (declare_by)"
+            )
         return said
 
     @property

@@ -336,9 +336,9 @@ class Sensor(Measuring):
         cells = Cells(targets, rows, wanted, wake.scans, wake.ticks, wake.ticks_per_s, wake.run)
         return cells, reason
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how often the cues that it had were too old."""
-        return {} if self._cueing is None else self._cueing.undone()
+        return {} if self._cueing is None else self._cueing.failure_counts()
 
     def report(self) -> dict[str, Any]:
         """Return when each target was first declared, if the sensor has a rule for it."""

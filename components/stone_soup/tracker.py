@@ -280,9 +280,9 @@ class StoneSoupTracker(Component):
             **moments,
         )  # fmt: skip
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return whose looks came too late."""
-        return self._count.undone()
+        return self._count.failure_counts()
 
     def report(self) -> dict[str, Any]:
         """Return whose looks came too late."""

@@ -114,14 +114,14 @@ class AdsBParameters(CooperativeParameters):
             )
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to a law of reception that is not taken."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.reception != "fitted":
             around = "aircraft_around", "airports_around"
-            said += self.idle(*around, because=f"reception is {self.reception!r}")
+            said += self.note_ineffective(*around, because=f"reception is {self.reception!r}")
         if self.heights == "geometric":
-            said += self.idle("pressure_deviation_m", because="heights is 'geometric'")
+            said += self.note_ineffective("pressure_deviation_m", because="heights is 'geometric'")
         return said
 
     def reach(self) -> Reach:

@@ -21,7 +21,7 @@ from components.surveillance.reports import CooperativeReports
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Output
 from dsa_des.errors import Disagreements, did_you_mean
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 
 #: Half of the time between positions that a velocity is of; a power of two.
 STEP_S = 1.0 / 64.0
@@ -82,9 +82,11 @@ class CooperativeParameters(SensorParameters):
         )
         return given
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say nothing of the keys that may not be given."""
-        return [said for said in super().without_effect() if not said.startswith(_MEASURED_KEYS)]
+        return [
+            said for said in super().ineffective_key_notes() if not said.startswith(_MEASURED_KEYS)
+        ]
 
 
 class CooperativeSensor(Sensor):
@@ -154,9 +156,9 @@ class CooperativeSensor(Sensor):
         super().__init__(name, parameters, context)
         self._unplaced = NO_COUNTS
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how many received aircraft sent no altitude, and so have no position, by run."""
-        return {**super().undone(), NO_CODE: self._unplaced}
+        return {**super().failure_counts(), NO_CODE: self._unplaced}
 
     def setup(self) -> None:
         """Refuse to leave out whom there is not."""
@@ -182,7 +184,7 @@ class CooperativeSensor(Sensor):
         """
         there = np.isfinite(altitude_m)
         run = cells.run[heard]
-        self._unplaced = with_cases(self._unplaced, run[~there], run)
+        self._unplaced = count_cases(self._unplaced, run[~there], run)
         return there
 
     @cached_property

@@ -36,7 +36,7 @@ from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import Tries, has_two_bits
+from dsa_des.record.failure_counts import Tries, has_two_bits
 
 # Fused tracks by number: as many as are compared.
 _TRACKS = 64
@@ -163,9 +163,9 @@ class CovarianceIntersection(Component):
         self._reported = empty_fused_tracks()
         self._tries = Tries()
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return the runs in which it never fused tracks of two trackers."""
-        return self._tries.undone(
+        return self._tries.failure_counts(
             "two trackers or more have tracks, and it never puts two of them together", of_two=True
         )
 

@@ -26,7 +26,7 @@ from components.tracking.track_store import TrackStore
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Producer
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 from dsa_des.time.clock import ClockSpec
 
 
@@ -245,14 +245,14 @@ class LookCount:
 
         return LookCount(
             {
-                name: with_cases(
+                name: count_cases(
                     self.counts.get(name, NO_COUNTS), runs_of(left_out, i), runs_of(came, i)
                 )
                 for i, name in enumerate(sensors)
             }
         )
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how many looks of each sensor came too late, of how many, by run."""
         return {
             f"a look of {name} comes too late and is left out": counts

@@ -249,20 +249,22 @@ class TrackerParameters(Parameters):
             )
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to an association, a rule or a lateness that is not chosen."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.association != "jpda":
             because = f"association is '{self.association}'"
-            said += self.idle("jpda_exact_detections", because=because)
+            said += self.note_ineffective("jpda_exact_detections", because=because)
         unused = {
             "m_of_n": ("false_confirmation", "missed_confirmation"),
             "likelihood_ratio": ("confirm_m", "confirm_n"),
         }
-        said += self.idle(*unused[self.initiation], because=f"initiation is '{self.initiation}'")
+        said += self.note_ineffective(
+            *unused[self.initiation], because=f"initiation is '{self.initiation}'"
+        )
         if self.start_gate_probability <= self.gate_probability:
             because = f"gate_probability is {self.gate_probability:g}"
-            said += self.idle("start_gate_probability", because=because)
+            said += self.note_ineffective("start_gate_probability", because=because)
         return said
 
 

@@ -21,7 +21,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Wake
-from dsa_des.record.undone import Tries
+from dsa_des.record.failure_counts import Tries
 
 #: How often what has grown too old is looked for, s.
 _ACTS_EVERY_S = Fraction(1, 2)
@@ -82,9 +82,9 @@ class TrackerStub(Component):
             for name, one in sensor_offers(self.context.producers).items()
         }
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return in which runs it received false alarms only."""
-        return self._tries.undone("all that it gets are false alarms, and it holds nothing")
+        return self._tries.failure_counts("all that it gets are false alarms, and it holds nothing")
 
     def acts_every_s(self) -> Fraction | None:
         """Return how often what has grown too old is looked for, s."""

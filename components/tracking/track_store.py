@@ -207,7 +207,7 @@ def state_tracks(
     """Return the message of what is reported, of states that carry so many errors."""
     ticks = wake.ticks[rows]
     if not reported:
-        empty = StateTracks.initial({}).of_runs(wake.run[rows])
+        empty = StateTracks.make_initial({}).of_runs(wake.run[rows])
         empty.tick, empty.offsets = ticks, np.zeros(len(ticks) + 1, dtype=np.int64)
         empty.sensors = sensors
         return empty

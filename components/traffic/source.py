@@ -161,7 +161,7 @@ class TrafficSource(Component):
             return replace(envelope, pitch_rad=0.5 * math.pi, roll_rad=math.pi)
         return envelope
 
-    def heed_change(self, from_s: Fraction, other: Any) -> None:
+    def apply_change(self, from_s: Fraction, other: Any) -> None:
         """Carry from an instant on what another instance does; all else of aircraft stays."""
         later = (*self.roster.later, (round(from_s * NANOSECONDS), other.roster))
         self.roster = replace(self.roster, later=later)
@@ -231,7 +231,7 @@ class TrafficSource(Component):
     def prepare(cls, parameters: Sequence[Any]) -> None:
         """Do what can be done at once for blocks with these parameters, which will be made."""
 
-    def together(
+    def make_for_all_runs(
         self, parameters: Sequence[Any], make: Callable[[int], Component]
     ) -> "TrafficSource | None":
         """Return what flies the flights of all runs."""
@@ -275,9 +275,9 @@ class TrafficSource(Component):
         most = sum(view.most_at_once for view in self._views) + len(self._views) - 1
         return min(most, len(self.roster))
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Say how far targets matter."""
-        return [view.left_out(self.roster.names) for view in self._views if view.culls]
+        return [view.culling_note(self.roster.names) for view in self._views if view.culls]
 
     def run(self, wake: Wake) -> Message | None:
         """Return the state of all aircraft that may matter, at every instant."""

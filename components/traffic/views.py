@@ -56,7 +56,7 @@ class View:
         """Whether any target may be left out."""
         return self.intervals is not None or self.epochs is not None
 
-    def left_out(self, names: Sequence[str]) -> str:
+    def culling_note(self, names: Sequence[str]) -> str:
         """Say how far targets of these names matter."""
         whose = "" if self.viewer < 0 else f" on {names[self.viewer]}"
         return (

@@ -142,13 +142,13 @@ class LookoutParameters(SensorParameters):
         both = min(low for low, _ in fields), max(high for _, high in fields)
         return replace(reach, azimuth_rad=both)
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys belong to another search, or to a range that nobody judges."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         other = "round_s" if self.search == "random" else "beta_per_sr_s"
-        said += self.idle(other, because=f"search is '{self.search}'")
+        said += self.note_ineffective(other, because=f"search is '{self.search}'")
         if not self.judges_range:
-            said += self.idle(
+            said += self.note_ineffective(
                 "range_error_m", "range_bias_m", "range_correlation_time_s",
                 because="judges_range is false",
             )  # fmt: skip

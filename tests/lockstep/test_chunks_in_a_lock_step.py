@@ -13,7 +13,7 @@ from lab import CONFIGS
 from dsa_des.errors import SceneError
 from dsa_des.replicas import replicas
 from dsa_des.replicas.lockstep import lock_step
-from dsa_des.results.folder import undone_of
+from dsa_des.results.folder import failure_counts_of_part
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies import attempts
 from dsa_des.studies.attempts import run_together
@@ -65,7 +65,7 @@ def test_chunks_of_any_size_share_lock_steps_and_have_the_bytes_of_each_alone(
         assert [part.runs for part in parts] == [len(chunk) for chunk in chunks]
         tables = [pq.read_table(io.BytesIO(part.content)) for part in parts]
         rows.append([row for table in tables for row in table.to_pylist()])
-        said = [undone_of(table) for table in tables]
+        said = [failure_counts_of_part(table) for table in tables]
         if per_chunk == 4:  # what each lacked is its own
             assert len({str(one) for one in said}) == 3
     assert rows[0] == rows[1]

@@ -18,7 +18,7 @@ from components.messages.reach import FarthestLook
 from components.surveillance.exchange import PositionExchange
 from dsa_des.arrays.run_ticks import runs_of_single
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.record.undone import Tries, add_counts
+from dsa_des.record.failure_counts import Tries, add_counts
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
@@ -67,9 +67,9 @@ def scene(sensors: Any, **more: Any) -> dict[str, Any]:
     return chain(sensors, ownship=OWN, targets=TARGETS, **{"duration_s": 10, **more})
 
 
-def undone(scene: Any) -> Mapping[str, Any]:
+def failure_counts(scene: Any) -> Mapping[str, Any]:
     loaded = dsa_des.load_scene(scene) if isinstance(scene, Mapping) else scene
-    return Simulation(loaded).run().undone
+    return Simulation(loaded).run().failure_counts
 
 
 def notes(scene: Any) -> list[str]:
@@ -110,7 +110,7 @@ def test_a_fusion_whose_sensors_never_meet_is_counted_by_runs(fusion: str) -> No
     )
     once = {"blocks.eye.offset_s": 0}
     together = replicas_of(dsa_des.load_scene(found), {}, once, {})
-    assert lock_step(together).run().undone == add_counts(map(undone, together))
+    assert lock_step(together).run().failure_counts == add_counts(map(undone, together))
     assert undone(together[1])["fusion"] == {NOT_TOGETHER: (0, 1)}
     alone = scene({"radar": RADAR}, fusion={"type": fusion})
     assert "fusion" not in undone(alone) and not any("never" in note for note in notes(alone))
@@ -224,7 +224,7 @@ def test_a_tracker_that_never_has_a_track_is_counted(tracker: str, what: str) ->
                  tracker={"type": tracker})  # fmt: skip
     assert undone(seen)["tracker"][what] == (0, 1)
     runs = replicas_of(dsa_des.load_scene(found), {}, {})
-    assert lock_step(runs).run().undone == add_counts(map(undone, runs))
+    assert lock_step(runs).run().failure_counts == add_counts(map(undone, runs))
 
 
 @pytest.mark.parametrize(
@@ -302,10 +302,13 @@ def test_tries_of_runs_add_up_whatever_comes_when() -> None:
     tries = Tries().add_tries(np.array([0, 2, 2]), np.array([1, 1, 2]), np.array([False] * 3))
     tries = tries.add_tries(np.array([4, 4, 0]), np.array([1, 2, 1]), np.arange(3) == 1)
     # Run 2, of 2 and 4; 0 and 2, of 0, 2 and 4.
-    assert tries.undone("x", of_two=True)["x"].tolist() == [[0, 0, 1, 0, 0], [0, 0, 1, 0, 1]]
-    assert tries.undone("x")["x"].tolist() == [[1, 0, 1, 0, 0], [1, 0, 1, 0, 1]]
-    assert Tries().undone("x")["x"].shape == (2, 0)
+    assert tries.failure_counts("x", of_two=True)["x"].tolist() == [
+        [0, 0, 1, 0, 0],
+        [0, 0, 1, 0, 1],
+    ]
+    assert tries.failure_counts("x")["x"].tolist() == [[1, 0, 1, 0, 0], [1, 0, 1, 0, 1]]
+    assert Tries().failure_counts("x")["x"].shape == (2, 0)
     alone = Tries().add_tries(runs_of_single(1), np.array([1]), np.array([True]))
     for _ in range(2):  # a second source comes later, and it is done no more
         alone = alone.add_tries(runs_of_single(2), np.array([1, 2]), np.zeros(2, dtype=bool))
-    assert alone.undone("x", of_two=True)["x"].tolist() == [[0], [1]]
+    assert alone.failure_counts("x", of_two=True)["x"].tolist() == [[0], [1]]
