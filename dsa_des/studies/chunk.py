@@ -285,7 +285,7 @@ def _fly_replicas(
 ) -> dict[str, AnyArray]:
     """Run replicas and return result → values.
 
-    What went wrong is put among `errors`, and what blocks could not do to its chunk's `failure_counts`.
+    What went wrong is put among `errors`, what blocks could not do to its chunk's counts.
     """
     values: dict[str, AnyArray] = {}
     done = 0

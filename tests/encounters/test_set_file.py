@@ -278,7 +278,7 @@ def test_miss_distances_are_drawn_as_the_command_line_says(model: Path, tmp_path
     assert h.min() >= -3000 and h.max() <= 1000 and v.min() >= -300 and v.max() <= 300
     assert abs((h > 0).mean() - 0.75) < 0.08
     assert abs((v > 100).mean() - 200 / (200 + 0.25 * 400)) < 0.08
-    # FailureCounts by the weights: uniform over all that is drawn. 4 standard errors of so uneven ones.
+    # Undone by the weights: uniform over all that is drawn. 4 standard errors of so uneven ones.
     w = found.weights / found.weights.sum()
     assert abs(w[h > 0].sum() - 0.25) < 0.09 and abs(w[v > 100].sum() - 1 / 3) < 0.11
 
