@@ -115,7 +115,7 @@ def record_asterix(
     )  # fmt: skip
     table.notes.warnings += warnings
     rows: dict[tuple[object, ...], dict[float, int]] = {}
-    samples: dict[int, list[str]] = {}
+    samples: dict[int, tuple[str, tuple[float, ...]]] = {}
     for k, record in enumerate(records):
         if record.category not in _AIRCRAFT:
             continue
@@ -127,14 +127,14 @@ def record_asterix(
                 "an old edition, which is not read, or damaged", line=k + 1,
             )  # fmt: skip
         before = mine.get(record.time_s)
-        if before is not None and np.isnan(sample[1:4]).any():
+        if before is not None and any(value != value for value in sample[1:4]):
             continue
         # Two records of one quantum of time are one instant: the later one counts.
         samples.pop(-1 if before is None else before, None)
         mine[record.time_s] = k
-        samples[k] = [names[_key(record)], *(repr(float(value)) for value in sample)]
-    for k, row in samples.items():
-        table.add_row(k + 1, row)
+        samples[k] = names[_key(record)], sample
+    for k, (name, sample) in samples.items():
+        table.add_numbers(k + 1, name, sample)
     if not names:
         problems.fail("there are no system tracks (062) and no ADS-B reports (021) in it")
     if ownship is None and _OWNSHIP in names.values():
@@ -373,4 +373,4 @@ def _sample(record: AsterixRecord, kinds: Sequence[Altitude]) -> tuple[float, ..
         east, north = values["speed_m_s"] * np.sin(track), values["speed_m_s"] * np.cos(track)
     up = values.get("velocity_up_m_s", values.get("barometric_climb_m_s"))
     moves = (east, north, up) if None not in (east, north, up) else (np.nan,) * 3
-    return record.time_s, *position, *moves
+    return record.time_s, *map(float, (*position, *moves))

@@ -151,7 +151,7 @@ class ElectroOpticalParameters(CameraParameters):
     )
 
     def ineffective_key_notes(self) -> list[str]:
-        """Say which keys belong to daylight, where no background is asked for."""
+        """Return a sentence for each key of daylight, where no background is given."""
         said = super().ineffective_key_notes()
         if self.background == "none":
             sun = "sun_azimuth_deg", "sun_elevation_deg", "sun_exclusion_deg"

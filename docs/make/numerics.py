@@ -26,8 +26,7 @@ Where do straightforward formulas fail, and what comes out here?
 
 Results of the straightforward formula and of dsa_des, and the true value. Printed by
 `python -m docs.make.numerics` (needs the extra `test`); `--check` compares this page with the
-results of your machine. The naive column may differ in its last digits from machine to machine:
-those digits are the noise this page is about.
+results of your machine. The naive column may differ in its last digits.
 """
 
 _COLUMNS = ("hard case", "naive formula", "naive result", "ours", "reference", "from")

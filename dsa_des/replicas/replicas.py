@@ -14,17 +14,11 @@ from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.drawn_columns import drawn_columns, scenes_of
+from dsa_des.replicas.lock_step_size import RunSize, are_few
 from dsa_des.replicas.lockstep import NotInLockStep, Replicas, lock_step
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
-#: Bytes that replicas which run together hold while they do, about. A feedback loop goes through as
-#: many windows whatever they hold: with these they take an eighth of the processor's time.
-_MOST_BYTES = 360e6
-# What one holds: tracks and tables whatever it is, two flights' samples, what is made of a scan.
-# 25 to 84 kB were measured of four closed and open loops of 120 and 180 s, 360 to 3240 scans.
-_BYTES, _BYTES_PER_S, _BYTES_PER_SCAN = 25e3, 275.0, 25.0
-_A_LONG_RUN_S = 3600.0
 #: Which columns of which tables are recorded; None records everything.
 Wanted = Mapping[str, Collection[str]] | None
 
@@ -70,17 +64,19 @@ def run_replicas(
     *,
     wanted: Wanted = None,
     runs: int | None = None,
+    most: int | None = None,
 ) -> list[Recorded | Failed]:
     """Run replicas of a scene, in lock step where they can; a failing one stops no other.
 
     `wanted` columns are recorded, by default all; `runs` is how many there are of the scene, where
-    these are some of them. What is returned is in the order of `replicas`, and each is identical to
+    these are some of them. At most so many as `most` run together, by default those that memory
+    holds. What is returned is in the order of `replicas`, and each is identical to
     a run of its own.
     """
     failed, scenes = _check_replicas(scene, replicas)
     ran: list[Recorded | Failed] = []
     runs = len(replicas) if runs is None else runs
-    for part in _split_by_memory(scenes):
+    for part in _split(scenes, wanted, most):
         together: Sequence[Recorded | Failed] | None = _run_together(part, wanted, runs)
         ran += together or [_run_alone(one, wanted, runs) for one in part]
     outcomes = iter(ran)
@@ -105,26 +101,13 @@ def _check_replicas(
     return failed, scenes
 
 
-def _split_by_memory(scenes: Sequence[Scene]) -> Iterator[Sequence[Scene]]:
+def _split(scenes: Sequence[Scene], wanted: Wanted, most: int | None) -> Iterator[Sequence[Scene]]:
     """Part replicas into as many as may run together."""
-    if not scenes:
-        return
-    most = largest_lock_step(scenes[0])
+    if most is None:
+        together = len(scenes) < 2 or are_few(scenes[0], len(scenes))
+        most = max(1, len(scenes)) if together else RunSize.of(scenes[0], wanted or {}).most
     for start in range(0, len(scenes), most):
         yield scenes[start : start + most]
-
-
-def largest_lock_step(scene: Scene) -> int:
-    """Return how many replicas of a scene may run together: all that they hold is in memory."""
-    return max(1, int(_MOST_BYTES / _likely_bytes(scene)))
-
-
-def _likely_bytes(scene: Scene) -> float:
-    """Return what a run holds, about, besides what is recorded of it."""
-    rates = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
-    per_s = float(sum(spec.rate_hz for spec in rates if spec is not None))
-    duration_s = float(scene.duration_s or _A_LONG_RUN_S)
-    return _BYTES + (_BYTES_PER_S + _BYTES_PER_SCAN * per_s) * duration_s
 
 
 def lock_step_refusal(scene: Scene, replicas: Sequence[Replica]) -> str | None:

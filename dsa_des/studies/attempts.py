@@ -17,7 +17,9 @@ from operator import itemgetter
 import numpy as np
 
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.replicas.replicas import largest_lock_step, lock_step_refusal
+from dsa_des.replicas.changed_scene import scene_of
+from dsa_des.replicas.lock_step_size import RunSize
+from dsa_des.replicas.replicas import lock_step_refusal
 from dsa_des.running.loops import opened_loops
 from dsa_des.studies.chunk import Done, crashed_run, join_pieces
 from dsa_des.studies.study import Chunk, Study
@@ -150,9 +152,9 @@ def _lock_step_size(study: Study, cell: int) -> int:
             scene, [study.replica(n, cell) for n in (0, 1)]
         ):
             return 0
+        return RunSize.of(scene_of(scene, study.replica(0, cell)), {}).most
     except (SceneError, BlockFailure):  # its rows say why
         return 0
-    return largest_lock_step(scene)
 
 
 def halves(chunk: Chunk) -> tuple[Chunk, Chunk]:

@@ -28,13 +28,8 @@ from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.files.sealed_files import parquet
 from dsa_des.record.failure_counts import FailureCounts, add_counts
 from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.replicas import (
-    Failed,
-    Recorded,
-    failure_counts_of_runs,
-    largest_lock_step,
-    run_replicas,
-)
+from dsa_des.replicas.lock_step_size import FEW, MOST_BYTES, RunSize, are_few
+from dsa_des.replicas.replicas import Failed, Recorded, failure_counts_of_runs, run_replicas
 from dsa_des.results.folder import failure_counts_of_part
 from dsa_des.results.record import (
     CRASHED,
@@ -44,7 +39,6 @@ from dsa_des.results.record import (
     columns_of,
     draw_column,
 )
-from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Allocation
 from dsa_des.studies.foreseen import choose_runs, foresee_all, geometry_of
@@ -288,26 +282,27 @@ def _fly_replicas(
     What went wrong is put among `errors`, what blocks could not do to its chunk's counts.
     """
     values: dict[str, AnyArray] = {}
-    done = 0
-    if len(_bytes_of_a_run) > _MOST_KNOWN:
-        _bytes_of_a_run.clear()
-    if key not in _bytes_of_a_run and len(replicas) > _FIRST_RUNS:
-        _bytes_of_a_run[key] = _likely_bytes(scene, replicas[0], columns_wanted(metrics))
+    done, wanted = 0, columns_wanted(metrics)
+    if len(_size_of_a_run) > _MOST_KNOWN:
+        _size_of_a_run.clear()
+    if key not in _size_of_a_run and not are_few(scene, len(replicas)):
+        _size_of_a_run[key] = _likely_size(scene, replicas[0], wanted)
     while done < len(replicas):
         # What runs together is measured together: of what blocks make for a batch nothing is made
         # again for the metrics, however many runs the chunk holds.
-        one_run = _bytes_of_a_run.get(key, _MOST_BYTES / _FIRST_RUNS)
-        most = min(largest_lock_step(scene), max(1, int(_MOST_BYTES / max(1.0, one_run))))
+        size = _size_of_a_run.get(key)
+        most = len(replicas) if size is None else size.most
         left = len(replicas) - done
         many = math.ceil(left / math.ceil(left / most))
         part = replicas[done : done + many]
-        outcomes = _outcomes(scene, part, columns_wanted(metrics))
+        outcomes = _outcomes(scene, part, wanted)
         for chunk in np.unique(of[done : done + many]).tolist():
             mine = np.flatnonzero(of[done : done + many] == chunk)
             failure_counts[chunk].append(failure_counts_of_runs(outcomes[k] for k in mine))
         recorded = [outcome for outcome in outcomes if isinstance(outcome, Recorded)]
-        if recorded:
-            _bytes_of_a_run[key] = sum(map(_bytes_of, recorded)) / len(recorded)
+        if recorded and size is not None:
+            each = sum(map(_bytes_of, recorded)) / len(recorded)
+            _size_of_a_run[key] = replace(size, recorded=each)
         good = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, Recorded)]
         for k, outcome in enumerate(outcomes):
             if isinstance(outcome, Failed):
@@ -322,25 +317,17 @@ def _fly_replicas(
     return values
 
 
-def _likely_bytes(scene: Scene, replica: Replica, wanted: Mapping[str, Any]) -> float:
-    """Return what a run hardly records more than: of every target a row at every scan.
-
-    Few runs to begin with would cost a closed loop as many windows as all.
-    """
+def _likely_size(scene: Scene, replica: Replica, wanted: Mapping[str, Any]) -> RunSize:
+    """Return what a run holds, before any has run: few runs to begin with would cost much."""
     try:
-        simulation = Simulation(scene_of(scene, replica))
-        width = max(component.width for component in simulation.components.values())
+        return RunSize.of(scene_of(scene, replica), wanted)
     except (SceneError, BlockFailure):  # its row says why
-        return _MOST_BYTES / _FIRST_RUNS
-    return 8.0 * sum(map(len, wanted.values())) * simulation.scans * max(1, width)
+        return RunSize(MOST_BYTES / FEW)
 
 
-#: Rows that runs of a study record at a time, in bytes; they are held up to three times. The runs
-#: before tell how many that is.
-_MOST_BYTES, _FIRST_RUNS = 150e6, 64
 _MOST_KNOWN = 1000
-#: By study and cell, from the runs before: it follows from the scene, and changes no result.
-_bytes_of_a_run: dict[tuple[str, int], float] = {}
+#: By study and cell; what is recorded, from the runs before. It changes no result.
+_size_of_a_run: dict[tuple[str, int], RunSize] = {}
 
 
 def _bytes_of(run: Recorded) -> int:
@@ -353,7 +340,7 @@ def _outcomes(
 ) -> list[Recorded | Failed]:
     """Run replicas; whatever one of them raises, memory that is short included, is its error."""
     try:
-        return run_replicas(scene, replicas, wanted=wanted)
+        return run_replicas(scene, replicas, wanted=wanted, most=len(replicas))
     except (Exception, SystemExit) as error:  # a block that wants to leave does not end the study
         if len(replicas) == 1:
             return [Failed(f"{type(error).__name__}: {error}")]

@@ -11,9 +11,11 @@ import pytest
 from lab import CONFIGS
 
 from dsa_des.errors import SceneError
-from dsa_des.replicas import replicas
+from dsa_des.replicas import lock_step_size, replicas
+from dsa_des.replicas.lock_step_size import RunSize, are_few
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.results.folder import failure_counts_of_part
+from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies import attempts
 from dsa_des.studies.attempts import run_together
@@ -74,7 +76,8 @@ def test_chunks_of_any_size_share_lock_steps_and_have_the_bytes_of_each_alone(
 def test_lock_steps_hold_what_memory_does_and_each_about_as_many(
     shared: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(replicas, "_likely_bytes", lambda scene: replicas._MOST_BYTES / 4)
+    monkeypatch.setattr(lock_step_size, "FEW", 0)
+    monkeypatch.setattr(lock_step_size.RunSize, "most", 4)
     whole = run_all(one := study(RUNS), list(one.chunks(0, [0])))
     assert shared == [4, 3, 3]
     del shared[:]
@@ -104,7 +107,28 @@ def test_a_run_holds_about_what_it_is_taken_for() -> None:
     finally:
         tracemalloc.stop()
     assert scene.duration_s == 180
-    assert peaks[1] - peaks[0] == pytest.approx(64 * replicas._likely_bytes(scene), rel=0.4)
+    assert peaks[1] - peaks[0] == pytest.approx(64 * RunSize.of(scene, {}).held, rel=0.4)
+
+
+def test_a_lock_step_of_many_aircraft_holds_as_many_fewer_runs() -> None:
+    """Two and nine aircraft; columns hold 8 bytes at each scan of each target, three times."""
+    aircraft = ", ".join(
+        f"{{name='{k}', east_m={99 * k}, north_m=3000, heading_deg=180, speed_mps=60}}"
+        for k in range(8)
+    )
+    sets = (f"blocks.traffic.intruders=[{aircraft}]",)
+    few, crowd = (
+        load_scene(CONFIGS / "avoidance" / "crossing_tracked.toml", sets=some, duration_s="60")
+        for some in ((), sets)
+    )
+    two, nine = (RunSize.of(scene, {}) for scene in (few, crowd))
+    assert (nine.held, nine.recorded) == (4.5 * two.held, 0.0)
+    assert nine.most == int(360e6 / nine.held)
+    wide = RunSize.of(crowd, {"tracks": ("tick", "range_m")})
+    scans = wide.recorded / (8 * 2 * 8)
+    assert scans == int(scans) > 60
+    assert wide.most == int(360e6 / (nine.held + 3 * wide.recorded))
+    assert are_few(crowd, 64) and not are_few(crowd, 65)
 
 
 def test_every_worker_has_about_as_much() -> None:

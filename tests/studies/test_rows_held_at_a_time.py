@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from dsa_des.replicas import lock_step_size
 from dsa_des.replicas.replicas import run_replicas
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies import chunk as chunks
@@ -50,9 +51,8 @@ def test_parts_of_a_chunk_give_its_bytes(small: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(chunks, "_measure", broken)
     whole = run_chunk(study, Chunk("part", ((0, 0, 16),)))
     assert recorded == [16] and 0 < whole.failed < 16
-    monkeypatch.setattr(chunks, "_MOST_BYTES", 15e3)
-    monkeypatch.setattr(chunks, "_FIRST_RUNS", 5)
-    chunks._bytes_of_a_run.clear()
+    monkeypatch.setattr(lock_step_size, "MOST_BYTES", 300e3)
+    chunks._size_of_a_run.clear()
     del recorded[:]
     parts = run_chunk(study, Chunk("part", ((0, 0, 16),)))
     assert parts.content == whole.content

@@ -133,6 +133,8 @@ def test_the_geometric_heights_that_are_sent_beside_know_no_weather():
     _, rows = crowd(2, position_errors="none")
     assert (np.round(rows["reported_height_m"] / 7.62, 6) % 1 == 0).all()
     assert np.abs(rows["reported_height_m"] - 1200).max() < 7.63
+    stated_m2 = rows["elevation_variance_rad2"] * rows["range_m"] ** 2
+    assert stated_m2[50:] == pytest.approx(2 * 7.62**2 / 12, rel=0.05)
     # With errors, 95 % within 45 or 150 m, and as large as is stated.
     for gva, within_m in ((1, 150), (2, 45)):
         _, rows = crowd(gva)

@@ -29,8 +29,10 @@ def measured(monkeypatch):
             "beside": {"a plain loop": 250.0 * k}, "simulated_s_per_s": 6000.0 / k, **calls,
         }  # fmt: skip
 
-    monkeypatch.setattr(made, "fresh", fresh)
-    monkeypatch.setattr(made.performance_queues, "fresh", lambda *of: fresh("queues", *of))
+    monkeypatch.setattr(made, "measure_in_new_process", fresh)
+    monkeypatch.setattr(
+        made.performance_queues, "measure_in_new_process", lambda *of: fresh("queues", *of)
+    )
     return made.measured(3, quick=False), asked
 
 

@@ -12,7 +12,7 @@ import dsa_des
 from components.metrics.encounter import ClosestApproach, WellClear
 from components.metrics.risk import Severity
 from dsa_des.files.toml_files import to_toml
-from dsa_des.replicas import replicas
+from dsa_des.replicas import lock_step_size, replicas
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
@@ -203,7 +203,8 @@ def test_an_end_is_early_only_if_it_is(tmp_path):
 @pytest.mark.parametrize("rules_s", [(3600.0, 2.0, 5.0, 3600.0, 8.0), (2.0, 3600.0, 3.0)])
 def test_metrics_of_runs_that_end_differently(tmp_path, monkeypatch, rules_s):
     """Runs of a chunk share flights, batches and tables; each is measured as if it were alone."""
-    monkeypatch.setattr(replicas, "_likely_bytes", lambda scene: replicas._MOST_BYTES / 2)
+    monkeypatch.setattr(lock_step_size, "FEW", 0)
+    monkeypatch.setattr(lock_step_size.RunSize, "most", 2)
     wanted = scene([BACK, crooked.ROLLING])
     (tmp_path / "scene.toml").write_text(to_toml(wanted), encoding="utf-8")
     base = load_scene(tmp_path / "scene.toml")

@@ -1,0 +1,59 @@
+"""How many runs a lock step holds: as many as memory does, with what is recorded of them."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from dsa_des.running.simulation import Simulation
+from dsa_des.scene.scene import Scene
+
+#: Bytes that runs which run together hold, about, while they do and are measured. A feedback loop
+#: goes through as many windows whatever they hold: with these they take an eighth of the time.
+MOST_BYTES = 360e6
+# What a run holds of each aircraft: tracks and tables whatever it is, samples, what a scan makes.
+# 25 to 84 kB were measured of two in four loops of 120 and 180 s and 360 to 3240 scans; of nine
+# 106 to 341 kB in 120 s and 600 scans, and of eight platforms 280 kB in 250 s and 2250 scans.
+_BYTES, _BYTES_PER_S, _BYTES_PER_SCAN = 12.5e3, 137.5, 12.5
+#: What is recorded is there so often at most: as it came, in order, and as a metric has it.
+_COPIES = 3
+#: So few runs are together whatever they hold, where two aircraft hold little of the limit.
+FEW = 64
+_SMALL_SHARE = 0.02
+_A_LONG_RUN_S = 3600.0
+
+
+@dataclass(frozen=True)
+class RunSize:
+    """Bytes that a run holds while it lasts, and that are recorded of it."""
+
+    held: float
+    recorded: float = 0.0
+
+    @classmethod
+    def of(cls, scene: Scene, wanted: Mapping[str, Collection[str]]) -> "RunSize":
+        """Return the likely size of a run of a scene of which some columns are recorded.
+
+        Of these there is hardly more than a row of every target at every scan. What is wrong with
+        the scene is raised.
+        """
+        simulation = Simulation(scene)
+        targets = max(1, *(component.width for component in simulation.components.values()))
+        held = _held_bytes(float(simulation.duration_s), simulation.scans, 1 + targets)
+        return cls(held, 8.0 * sum(map(len, wanted.values())) * simulation.scans * targets)
+
+    @property
+    def most(self) -> int:
+        """How many such runs a lock step holds."""
+        return max(1, int(MOST_BYTES / (self.held + _COPIES * self.recorded)))
+
+
+def are_few(scene: Scene, runs: int) -> bool:
+    """Return whether so many runs go together however many aircraft there are, up to a hundred."""
+    specs = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
+    per_s = float(sum(spec.rate_hz for spec in specs if spec is not None))
+    duration_s = float(scene.duration_s or _A_LONG_RUN_S)
+    held = runs * _held_bytes(duration_s, per_s * duration_s, 2)
+    return runs <= FEW and held <= _SMALL_SHARE * MOST_BYTES
+
+
+def _held_bytes(duration_s: float, scans: float, aircraft: int) -> float:
+    return aircraft * (_BYTES + _BYTES_PER_S * duration_s + _BYTES_PER_SCAN * scans)
