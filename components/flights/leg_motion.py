@@ -9,21 +9,26 @@ from typing import Any, Literal
 import numpy as np
 from geographiclib.geodesic import Geodesic
 
+from components.flights.fleet import evaluate_in_blocks
 from components.flights.geodesic_motion import each, geodesic_state, power
 from components.geometry import (
     ECCENTRICITY_SQUARED,
     TWO_PI,
+    TrajectoryState,
     local_axes,
     normal_to_degrees,
     radii_of_curvature,
     remainder,
     wrap_heading_rad,
 )
-from dsa_des.arrays.types import FloatArray
+from dsa_des.arrays.growing_arrays import Growing, GrowingArray
+from dsa_des.arrays.types import FloatArray, IntArray
 
 #: Parts east and north.
 Pair = tuple[FloatArray, FloatArray]
 
+LONGEST_FLIGHT_S = 1e12
+"""Flights are held up to here (30,000 years) and stand still after, so that nothing overflows."""
 LARGEST_TURN_RADIUS_M = 200_000.0
 """Up to here a turn keeps its speed to 2e-4; the error grows with the radius, 1e-6 at 1 km."""
 
@@ -208,6 +213,8 @@ def _offsets_to_angles(
 # Rows of a ramp from 9 on: those of its chart, its velocity at first and how that changes, for how
 # long, its altitude, and where its nose points while it stands.
 _FROM_EAST, _FROM_NORTH, _MORE_EAST, _MORE_NORTH, _LASTS, _LEVEL, _NOSE = range(11, 18)
+#: How many there are.
+RAMP_ROWS = 18
 # Who is slower stands; and offsets are no less than this, as angles, for their direction.
 _STANDS_MPS, _LEAST_ANGLE = 1e-6, 1e-15
 
@@ -303,3 +310,59 @@ FORMULAS = {
     "geodesic": geodesic_state, "turn": turn_state, "hold": hold_state, "ramp": ramp_state,
 }  # fmt: skip
 KINDS: tuple[Kind, ...] = ("geodesic", "turn", "hold", "ramp")
+
+
+class Ramps(Growing):
+    """Flights of one ramp each, from when on, s, by the table of `ramp_parameters`.
+
+    They fly as scripts of one such leg, of which only what differs is held: every multirotor of a
+    fleet begins one in every second.
+    """
+
+    def __init__(self, start_s: FloatArray, table: FloatArray, fastest_mps: FloatArray) -> None:
+        self._start_s, self.max_speeds_mps = start_s, fastest_mps
+        #: The rows of a ramp beside each other in memory: some ramps are taken at once.
+        self._tables = GrowingArray(np.asfortranarray(table))
+
+    def with_flights(self, ramps: Ramps) -> Ramps:
+        """Return these and more ramps at their end."""
+        if not len(self):  # nothing says there how the rows lie in memory
+            return ramps
+        fleet = self.with_more(_start_s=ramps._start_s, max_speeds_mps=ramps.max_speeds_mps)
+        fleet._tables = self._tables.with_more(ramps._tables.values)
+        return fleet
+
+    def __len__(self) -> int:
+        return len(self._start_s)
+
+    def segment(self, ramp: int) -> tuple[Segment, float]:
+        """Return a ramp as a leg, and when it begins, s."""
+        table = self._tables.values[:, ramp].copy()
+        fastest_mps = float(self.max_speeds_mps[ramp])
+        return Segment("ramp", 0.0, table, 0.0, 0.0, fastest_mps), float(self._start_s[ramp])
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states of ramps (n,), each at a time (n,) of its own, in s."""
+        return evaluate_in_blocks(self._state, aircraft, time_s)
+
+    def velocities_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return velocities east and north (2, n), asked for as in `each`."""
+        return np.stack(ramp_velocity(*self._at(aircraft, time_s)[:2]))
+
+    def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return speeds over ground, asked for as in `each`."""
+        return np.asarray(np.hypot(*self.velocities_mps(aircraft, time_s)))
+
+    def _at(
+        self, aircraft: IntArray, time_s: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return tables (rows, n), for how long the ramps are flown, s, and when they begin, s."""
+        table = np.ascontiguousarray(self._tables.values.T.take(aircraft, axis=0).T)
+        start_s = self._start_s.take(aircraft)
+        elapsed = np.minimum(np.maximum(time_s, start_s), start_s + LONGEST_FLIGHT_S) - start_s
+        return table, elapsed, start_s
+
+    def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        table, elapsed, start_s = self._at(aircraft, time_s)
+        level = np.zeros(len(elapsed))
+        return TrajectoryState(*ramp_state(table, elapsed), level, level, time_s >= start_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from functools import cached_property
 from math import atan2, cos, inf, isnan, radians
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 
 from components.flights.fleet import Fleet, MixedFleet, Trajectory, assemble_rows
 from components.flights.geodesic_motion import geodesic_parameters
-from components.flights.leg_motion import KINDS, ramp_parameters
+from components.flights.leg_motion import KINDS, RAMP_ROWS, Ramps, ramp_parameters
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.flights.scripted_flights import MOST_ALT_M, ScriptedFleet, ScriptedTrajectory
 from components.flights.steering_plan import SteeredPart, chords, steered_parts, times_around_s
@@ -103,12 +104,14 @@ class SteeredFleet(Growing, Fleet):
         self.manoeuvre_count[: len(parts)] = [len(of_one) for of_one in parts]
         flown = [flight for of_one in parts for _, flight in of_one]
         self._parts = ScriptedFleet(flown)
-        #: Each part with its plan; None of those on a ramp.
+        #: Parts that velocities led to, of whom the parts above are none.
+        self._ramps = Ramps(np.empty(0), np.empty((RAMP_ROWS, 0)), np.empty(0))
+        #: Each part of a script with its plan; None of those without.
         self._flown = np.array(
             [one if isinstance(one, SteeredPart) else None for one in flown], dtype=object
         )
-        #: Of each ownship: when its parts begin, in order, and which they are. Fleets that came of
-        #: this one write theirs behind them; how many have, and which of them this one is.
+        #: Of each ownship: when its parts begin, in order, and which they are: ~k is ramp k. Fleets
+        #: that came of this one write theirs behind; how many have, which of them this one is.
         self._written, self._version = [0], 0
         room = len(flights), int(self.manoeuvre_count.max(initial=0)) + 1
         self._start_s, self._part = np.full(room, np.inf), np.zeros(room, dtype=np.int64)
@@ -131,8 +134,14 @@ class SteeredFleet(Growing, Fleet):
         """Return what an ownship flies after its manoeuvres."""
         count = int(self.manoeuvre_count[ownship])
         starts_s, numbers = self._start_s[ownship, :count], self._part[ownship, :count]
-        flown = (self._flown[n] or self._parts[n] for n in numbers.tolist())
-        return tuple(zip(starts_s.tolist(), flown, strict=True))
+        return tuple(zip(starts_s.tolist(), map(self._flight_of, numbers.tolist()), strict=True))
+
+    def _flight_of(self, part: int) -> ScriptedTrajectory:
+        if part < 0:
+            ramp, start_s = self._ramps.segment(~part)
+            return ScriptedTrajectory.of_segments("ownship", [ramp], (None,) * 3, start_s, inf)
+        flown: ScriptedTrajectory = self._flown[part] or self._parts[part]
+        return flown
 
     def subset(self, columns: IntArray) -> SteeredFleet:
         """Return the fleet of some flights, in any order, without preparing them anew."""
@@ -143,9 +152,18 @@ class SteeredFleet(Growing, Fleet):
             some = SteeredFleet(flights.subset(columns))
         else:
             some = SteeredFleet(fleet_of([flights[number] for number in columns.tolist()]))
-        some._parts, some._flown = self._parts, self._flown
+        some._parts, some._flown, some._ramps = self._parts, self._flown, self._ramps
         for name in ("manoeuvre_count", "_start_s", "_part"):
             setattr(some, name, getattr(self, name)[columns])
+        return some
+
+    def part(self, flights: slice, nominal: Fleet) -> SteeredFleet:
+        """Return the fleet of some flights in their order, which `nominal` are without any."""
+        some = copy(self)
+        some.__dict__.pop("max_speeds_mps", None)
+        some._flights, some._alone, some._written = nominal, None, [-1]
+        for name in ("manoeuvre_count", "_start_s", "_part"):
+            setattr(some, name, getattr(self, name)[flights])
         return some
 
     def each(
@@ -157,12 +175,23 @@ class SteeredFleet(Growing, Fleet):
         own, after, which = self._split_by_manoeuvre(aircraft, time_s, known)
         if not len(after):
             return self._states_before_steering(aircraft, time_s)
-        steered = self._parts.each(which, time_s[after])
+        steered = self._steered_at(which, time_s[after])
         if not len(own):
             return steered
         return assemble_rows(
             [own, after], [self._states_before_steering(aircraft[own], time_s[own]), steered]
         )
+
+    def _steered_at(self, which: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states of some parts."""
+        scripts, ramps = (which >= 0).nonzero()[0], (which < 0).nonzero()[0]
+        if not len(ramps):
+            return self._parts.each(which, time_s)
+        on_ramps = self._ramps.each(~which[ramps], time_s[ramps])
+        if not len(scripts):
+            return on_ramps
+        others = self._parts.each(which[scripts], time_s[scripts])
+        return assemble_rows([scripts, ramps], [others, on_ramps])
 
     def _states_before_steering(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return states before any manoeuvre."""
@@ -175,7 +204,7 @@ class SteeredFleet(Growing, Fleet):
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None
     ) -> tuple[IntArray, IntArray, IntArray]:
         """Return which (n,) are before their first manoeuvre, which after, and in which part."""
-        if not len(self._flown):
+        if not len(self._flown) and not len(self._ramps):
             return np.arange(len(time_s)), _NOBODY, _NOBODY
         count = self.manoeuvre_count.take(aircraft)
         if known is not None:
@@ -207,7 +236,10 @@ class SteeredFleet(Growing, Fleet):
         own, after, which = self._split_by_manoeuvre(aircraft, time_s, known)
         speed_mps = np.empty(len(time_s))
         speed_mps[own] = self._flights.ground_speeds_mps(aircraft[own], time_s[own])
-        speed_mps[after] = self._parts.ground_speeds_mps(which, time_s[after])
+        scripts, ramps = which >= 0, which < 0
+        of, at_s = after[scripts], time_s[after]
+        speed_mps[of] = self._parts.ground_speeds_mps(which[scripts], at_s[scripts])
+        speed_mps[after[ramps]] = self._ramps.ground_speeds_mps(~which[ramps], at_s[ramps])
         return speed_mps
 
     def fixed_attitudes_rad(
@@ -221,10 +253,12 @@ class SteeredFleet(Growing, Fleet):
 
     def largest_speed(self, ownship: IntArray, time_s: FloatArray) -> FloatArray:
         """Return the largest speed of any manoeuvre begun by ownships (n,) by times (n,), or 0."""
-        if not len(self._flown):
+        parts = int(self.manoeuvre_count.max(initial=0))
+        if not parts:
             return np.zeros(len(ownship))
-        parts = int(self.manoeuvre_count.max())
-        speeds = self._parts.max_speeds_mps[self._part[ownship, :parts]]
+        # Counted from its end, the last one is that of the first ramp.
+        every_mps = np.append(self._parts.max_speeds_mps, self._ramps.max_speeds_mps[::-1])
+        speeds = every_mps[self._part[ownship, :parts]]
         begun = self._start_s[ownship, :parts] <= time_s[:, np.newaxis]
         begun &= np.arange(parts) < self.manoeuvre_count[ownship, np.newaxis]
         return np.asarray(np.where(begun, speeds, 0.0).max(axis=1))
@@ -246,19 +280,24 @@ class SteeredFleet(Growing, Fleet):
         ramps = ~np.isnan(given[:, _VELOCITY[0]])
         if ramps.any():
             mine, others = ramps.nonzero()[0], (~ramps).nonzero()[0]
-            new = self._fly_ramps(ownship[mine], time_s[mine], given[mine])
-            fleet = self._with_parts(ownship[mine], time_s[mine], new, [None] * len(mine))
+            fleet = self._with_parts(
+                ownship[mine], time_s[mine], ~(len(self._ramps) + np.arange(len(mine)))
+            )
+            fleet._ramps = self._ramps.with_flights(
+                self._fly_ramps(ownship[mine], time_s[mine], given[mine])
+            )
             if not len(others):
                 return fleet
             return fleet.add_manoeuvres(ownship[others], time_s[others], given[others])
         around = self._states_around(ownship, time_s)
-        before = [
-            self._flown[self._part[own, count - 1]] if count else None
-            for own, count in zip(ownship, self.manoeuvre_count[ownship], strict=True)
-        ]
+        count = self.manoeuvre_count[ownship]
+        last = np.where(count > 0, self._part[ownship, count - 1], -1).tolist()
+        before = [self._flown[part] if part >= 0 else None for part in last]
         every = [Manoeuvre(*row) for row in given.tolist()]
         flown = steered_parts("ownship", around, time_s, every, before)
-        return self._with_parts(ownship, time_s, ScriptedFleet(flown), flown)
+        fleet = self._with_parts(ownship, time_s, len(self._flown) + np.arange(len(flown)))
+        fleet._parts = self._parts.with_flights(ScriptedFleet(flown))
+        return fleet.with_more(_flown=np.array(flown, dtype=object))
 
     def _states_around(self, ownship: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return where ownships are around times (n,), as at `times_around_s`, (n, 3)."""
@@ -266,11 +305,15 @@ class SteeredFleet(Growing, Fleet):
         around = self.each(np.repeat(ownship, times_s.shape[1]), times_s.reshape(-1))
         return around.reshape(times_s.shape)
 
-    def _fly_ramps(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> ScriptedFleet:
+    def _fly_ramps(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> Ramps:
         """Return what ownships fly from their velocities at times (n,) to commanded ones."""
         _, after, which = self._split_by_manoeuvre(ownship, time_s, None)
         velocity = np.full((2, len(time_s)), np.nan)
-        velocity[:, after] = self._parts.ramp_velocities_mps(which, time_s[after])
+        at_s, scripts, ramps = time_s[after], which >= 0, which < 0
+        velocity[:, after[ramps]] = self._ramps.velocities_mps(~which[ramps], at_s[ramps])
+        if not ramps.all():
+            of_scripts = self._parts.ramp_velocities_mps(which[scripts], at_s[scripts])
+            velocity[:, after[scripts]] = of_scripts
         here = self.each(ownship, time_s)
         rest = np.isnan(velocity[0]).nonzero()[0]
         if len(rest):
@@ -283,28 +326,12 @@ class SteeredFleet(Growing, Fleet):
             (east, north), acceleration,
         )  # fmt: skip
         fastest = np.maximum(np.hypot(*velocity), np.hypot(east, north))
-        zero, kind = np.zeros(len(time_s)), KINDS.index("ramp")
-        return ScriptedFleet.of_columns(
-            ["ownship"] * len(time_s),
-            np.stack([time_s, zero + inf]),
-            np.full((3, len(time_s)), np.nan),
-            np.ones(len(time_s), dtype=np.int64),
-            np.stack([zero, zero, zero, fastest]),
-            np.full(len(time_s), kind, dtype=np.int64),
-            {kind: table},
-        )
+        return Ramps(time_s, table, fastest)
 
-    def _with_parts(
-        self,
-        ownship: IntArray,
-        time_s: FloatArray,
-        new: ScriptedFleet,
-        flown: Sequence[SteeredPart | None],
-    ) -> SteeredFleet:
+    def _with_parts(self, ownship: IntArray, time_s: FloatArray, part: IntArray) -> SteeredFleet:
         """Return the flights with a new part of each of some ownships from times on."""
-        fleet = self.with_more(_flown=np.array(flown, dtype=object))
+        fleet = copy(self)
         fleet.__dict__.pop("max_speeds_mps", None)
-        fleet._parts = self._parts.with_flights(new)
         index = self.manoeuvre_count[ownship]
         wide = self._start_s.shape[1]
         if self._written[0] != self._version or int(index.max()) >= wide:
@@ -315,7 +342,7 @@ class SteeredFleet(Growing, Fleet):
         fleet._written[0] += 1
         fleet._version = fleet._written[0]
         fleet._start_s[ownship, index] = time_s
-        fleet._part[ownship, index] = len(self._flown) + np.arange(len(new))
+        fleet._part[ownship, index] = part
         fleet.manoeuvre_count = self.manoeuvre_count.copy()
         fleet.manoeuvre_count[ownship] += 1
         return fleet
@@ -341,7 +368,7 @@ class SteeredFlight:
 
     @property
     def parts(self) -> Parts:
-        """What it flies after its manoeuvres, and from when on, s."""
+        """Return the flown path after manoeuvres, with the time (s) from which each part holds."""
         return self._fleet.parts_of(self._number)
 
     @property

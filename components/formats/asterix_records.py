@@ -321,7 +321,7 @@ def _wrong(path: Path, at: int, problem: str) -> TrafficFileError:
 
 
 def _blocks(path: Path, data: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Give the byte at which each data block begins, its category, and its records."""
+    """Yield the byte at which each data block begins, its category, and its records."""
     at = 0
     if not data:
         raise TrafficFileError(str(path), ["the file is empty: data blocks of ASTERIX are needed"])

@@ -44,7 +44,7 @@ class PotentialParameters(Parameters):
     )  # fmt: skip
 
     def without_effect(self) -> list[str]:
-        """Say that its own way is flown at the largest speed, where that is slower."""
+        """Return a sentence where the own speed is above the largest, at which it is flown."""
         said = super().without_effect()
         if self.speed_mps <= self.most_mps:
             return said
@@ -78,7 +78,7 @@ class VoltagePotential(Component):
         return False
 
     def request(self, port: str) -> FarthestLook | None:
-        """Ask for no target in the states: of these only one's own place is read."""
+        """Return a request for no targets in the states: only the own position is read."""
         return FarthestLook(0.0) if port == "states" else None
 
     def setup(self) -> None:
@@ -108,15 +108,17 @@ class VoltagePotential(Component):
         self._unmoved = with_cases(self._unmoved, wake.run[some & still], wake.run[some])
         place = np.array([states.own_lat_deg, states.own_lon_deg, states.own_alt_m])
         commanded = np.full((2, len(wake)), math.nan)
-        for rows in turns(wake.run):
+        for turn in turns(wake.run):
+            # Of most wakes all rows are of one turn, which need not be picked.
+            rows = slice(None) if len(turn) == len(wake) else turn
             run = wake.run[rows]
             yaw = states.own_yaw_rad[rows]
             new = KeyedTable(
                 replica=run,
-                active=np.zeros((heard.shape[1], len(rows)), dtype=bool),
+                active=np.zeros((heard.shape[1], len(turn)), dtype=bool),
                 track=yaw,
                 goal=place[:, rows].copy(),
-                last_mps=np.full((2, len(rows)), math.nan),
+                last_mps=np.full((2, len(turn)), math.nan),
             )
             unknown = np.flatnonzero(~np.isin(run, self._known.replica))
             if len(unknown) and self.p.goal_m is not None:
@@ -129,15 +131,16 @@ class VoltagePotential(Component):
             active = now | (known.active.T & ~(done & heard[rows]))
             velocity = self._undisturbed_velocity(known, place[:, rows])
             velocity = np.where(active.any(axis=1), own, velocity)
-            with np.errstate(invalid="ignore"):
-                out = push_velocity(seen, own, now, self._kept)
-            velocity = self._limit_speed(np.where(now.any(axis=1), out, velocity))
+            pushed = now.any(axis=1)
+            if pushed.any():
+                velocity = np.where(pushed, push_velocity(seen, own, now, self._kept), velocity)
+            velocity = self._limit_speed(velocity)
             # Nothing is told to who has not been steered, and flies its own way without it.
             silent = np.isnan(known.last_mps[0]) & ~active.any(axis=1) & (self.p.goal_m is None)
             same = (velocity == known.last_mps).all(axis=0) | silent
             velocity = np.where(same | np.isnan(velocity[0]), known.last_mps, velocity)
             told = (velocity != known.last_mps).any(axis=0) & np.isfinite(velocity[0])
-            commanded[:, rows[told]] = velocity[:, told]
+            commanded[:, turn[told]] = velocity[:, told]
             newer = known.with_columns(active=active.T.copy(), last_mps=velocity)
             self._known = self._known.replace_runs(run, newer, wake.first_run)
         return self._velocities(wake, commanded)
@@ -186,17 +189,20 @@ def _dense(alerts: AlertLevels) -> tuple[Others, FloatArray, BoolArray]:
 
     Positions in alerts are the ownship's less the target's.
     """
-    row: IntArray = alerts.row_of_entries
-    shape = len(alerts), len(alerts.roster)
-    known = alerts.target >= 0
-    at = row[known], alerts.target[known]
+    shape, target = (len(alerts), len(alerts.roster)), alerts.target
+    own = np.array([alerts.own_motion[name] for name in ("east_mps", "north_mps")])
+    names = ("east_m", "north_m"), ("east_mps", "north_mps")
+    if len(target) == math.prod(shape) and (target.reshape(shape) == np.arange(shape[1])).all():
+        every = (np.stack([-alerts.relative[of].reshape(shape) for of in two]) for two in names)
+        return Others(*every), own, np.ones(shape, dtype=bool)
+    known = target >= 0
+    at = alerts.row_of_entries[known], target[known]
     heard = np.zeros(shape, dtype=bool)
     heard[at] = True
     parts = []
-    for names in (("east_m", "north_m"), ("east_mps", "north_mps")):
+    for two in names:
         part = np.full((2, *shape), math.nan)
-        for axis, name in zip(part, names, strict=True):
+        for axis, name in zip(part, two, strict=True):
             axis[at] = -alerts.relative[name][known]
         parts.append(part)
-    own = np.array([alerts.own_motion[name] for name in ("east_mps", "north_mps")])
     return Others(*parts), own, heard

@@ -33,17 +33,17 @@ class Others(NamedTuple):
 
 def closest(others: Others) -> tuple[FloatArray, FloatArray]:
     """Return when others are closest, s, and where they are then, m (2, n, others)."""
-    speed2 = (others.velocity_mps**2).sum(axis=0)
-    closing = -(others.position_m * others.velocity_mps).sum(axis=0)
-    time_s = closing / np.maximum(speed2, _LEAST_SPEED2)
+    (east, north), (east_mps, north_mps) = others
+    closing = -(east * east_mps + north * north_mps)
+    time_s = closing / np.maximum(_squared(others.velocity_mps), _LEAST_SPEED2)
     return time_s, others.position_m + others.velocity_mps * time_s
 
 
 def conflicts(others: Others, kept: KeptApart) -> BoolArray:
     """Return which others come within the radius in time, (n, others); NaN never does."""
-    speed2 = (others.velocity_mps**2).sum(axis=0)
+    speed2 = _squared(others.velocity_mps)
     time_s, miss = closest(others)
-    inside2 = kept.radius_m**2 - (miss**2).sum(axis=0)
+    inside2 = kept.radius_m**2 - _squared(miss)
     half_s = np.sqrt(np.maximum(inside2, 0.0) / np.maximum(speed2, _LEAST_SPEED2))
     meets = (inside2 > 0.0) & (time_s - half_s < kept.lookahead_s) & (time_s + half_s > 0.0)
     return np.asarray(meets & (speed2 >= _LEAST_SPEED2))
@@ -54,13 +54,16 @@ def may_resume(others: Others, own_mps: FloatArray, kept: KeptApart) -> BoolArra
 
     `own_mps` is one's own velocity (2, n).
     """
-    past = (others.position_m * others.velocity_mps).sum(axis=0) > 0.0
-    range_m = np.hypot(*others.position_m)
-    own = own_mps[:, :, np.newaxis]
-    track, theirs = np.arctan2(*own), np.arctan2(*(own + others.velocity_mps))
+    (east, north), (east_mps, north_mps) = others
+    range_m = np.hypot(east, north)
+    apart = (east * east_mps + north * north_mps > 0.0) & (range_m >= kept.radius_m)
+    # Tracks matter of the few who are hardly apart.
+    row, column = (apart & (range_m < kept.margin * kept.radius_m)).nonzero()
+    own = own_mps[:, row]
+    track, theirs = np.arctan2(*own), np.arctan2(*(own + others.velocity_mps[:, row, column]))
     apart_rad = np.abs((theirs - track + np.pi) % (2.0 * np.pi) - np.pi)
-    beside = (apart_rad < _PARALLEL_RAD) & (range_m < kept.margin * kept.radius_m)
-    return np.asarray(past & (range_m >= kept.radius_m) & ~beside)
+    apart[row, column] = ~(apart_rad < _PARALLEL_RAD)
+    return apart
 
 
 def push_velocity(
@@ -75,6 +78,8 @@ def push_velocity(
     Hoekstra, van Gent & Ruigrok, "Designing for safety: the 'free flight' air traffic management
     concept", Reliability Engineering & System Safety 75, 2002.
     """
+    row, column = pushing.nonzero()
+    others = Others(*(part[:, row, column] for part in others))
     radius_m = kept.margin * kept.radius_m
     time_s, miss = closest(others)
     range_m, miss_m = np.hypot(*others.position_m), np.hypot(*miss)
@@ -87,5 +92,11 @@ def push_velocity(
     angle = np.arcsin(np.where(outside, radius_m / far_m, 0.0))
     angle = angle - np.arcsin(np.where(outside, miss_m / far_m, 0.0))
     gain_m = np.where(outside, radius_m / np.cos(angle), radius_m) - miss_m
-    push = gain_m / (np.maximum(np.abs(time_s), _LEAST_TIME_S) * miss_m) * miss
-    return np.asarray(own_mps - np.where(pushing, push, 0.0).sum(axis=-1))
+    push = np.zeros((2, *pushing.shape))
+    push[:, row, column] = gain_m / (np.maximum(np.abs(time_s), _LEAST_TIME_S) * miss_m) * miss
+    return np.asarray(own_mps - push.sum(axis=-1))
+
+
+def _squared(vector: FloatArray) -> FloatArray:
+    """Return squares of lengths of vectors (2, ...)."""
+    return np.asarray(vector[0] * vector[0] + vector[1] * vector[1])

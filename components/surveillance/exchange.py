@@ -52,7 +52,7 @@ class PositionExchange(Component):
     rewindable = True
 
     def request(self, port: str) -> FarthestLook:
-        """Ask for all, and for their flights, which velocities are of."""
+        """Return a request for all targets with their flights, for velocities."""
         return FarthestLook(math.inf, lasts_s=_STEP_S)
 
     def setup(self) -> None:
@@ -73,7 +73,7 @@ class PositionExchange(Component):
         return ["nobody else flies: it hears of nobody"] if alone else []
 
     def run(self, wake: Wake) -> AlertLevels | None:
-        """Give all fixes of every scan, relative to one's own."""
+        """Return the fixes of all targets at every scan, relative to the own fix."""
         states: TrafficStates | None = wake["states"]
         if states is None:
             return None
@@ -82,34 +82,37 @@ class PositionExchange(Component):
         )
         if states.flights is None:
             return None
-        everybody = _in_order(states)
-        velocities, position_errors, velocity_errors = states.flights.once(
+        fixes = states.flights.once(
             f"fixes {self.p.position_m} {self.p.velocity_mps}",
-            (wake.ticks, wake.run, states.columns, everybody),
-            lambda: self._fixes(wake, states, everybody),
+            (wake.ticks, wake.run, states.tick, states.columns, states.flights.known),
+            lambda: self._fixes(wake, states),
         )
-        viewer = _place(states)
-        others = np.arange(1, everybody.shape[2])
-        others[viewer - 1 : viewer] = 0  # the ownship is in the place of who looks
-        own_mps, velocity = velocities[:, :, viewer], velocities[:, :, others]
-        position = _way(everybody[:, :, [viewer]], everybody[:, :, others])
-        mine = position_errors[:, :, [viewer]], velocity_errors[:, :, [viewer]]
-        theirs = position_errors[:, :, others], velocity_errors[:, :, others]
-        row, column = states.present.nonzero()
-        apart = [(theirs[k] - mine[k])[:, row, column] for k in range(2)]
-        position = position[:, row, column] + np.stack([*apart[0], 0.0 * row])
-        relative = velocity[:, row, column] - own_mps[:, row] + np.stack([*apart[1], 0.0 * row])
-        east, north, up = position
-        closing = -(position[:2] * relative[:2]).sum(axis=0)
-        speed2 = np.maximum((relative[:2] ** 2).sum(axis=0), 1e-9)
-        closest_s = np.maximum(closing / speed2, 0.0)
+        (own_mps, velocity), *errors = (_split(part, _place(states)) for part in fixes)
+        own, targets = _positions(states)
+        position, relative = _way(own[:, :, np.newaxis], targets), velocity - own_mps
+        for part, (mine, theirs) in zip((position, relative), errors, strict=True):
+            part[:2] += theirs - mine
+            part[2] += 0.0
+        if states.present.all():
+            row = np.arange(len(wake)).repeat(len(states.columns))
+            target = np.tile(states.columns, len(wake))
+            position, relative = position.reshape(3, -1), relative.reshape(3, -1)
+        else:
+            row, column = states.present.nonzero()
+            target = states.columns[column]
+            position, relative = position[:, row, column], relative[:, row, column]
+        (east, north, up), (east_mps, north_mps, _) = position, relative
+        speed2 = np.maximum(east_mps * east_mps + north_mps * north_mps, 1e-9)
+        closest_s = np.maximum(-(east * east_mps + north * north_mps) / speed2, 0.0)
         miss = np.hypot(*(position[:2] + relative[:2] * closest_s))
-        own_mps = own_mps + np.stack([*mine[1][:, :, 0], np.zeros(len(wake))])
+        own_mps = own_mps[:, :, 0]
+        own_mps[:2] += errors[1][0][:, :, 0]
+        own_mps[2] += 0.0
         names = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
         return AlertLevels(
             wake.ticks,
             offsets_of(row, len(wake)),
-            states.columns[column],
+            target,
             np.zeros(len(row), dtype=np.int64),
             {},
             closest_s,
@@ -125,11 +128,16 @@ class PositionExchange(Component):
             states.roster,
         )
 
-    def _fixes(
-        self, wake: Wake, states: TrafficStates, here: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return velocities of everybody (3, rows, aircraft), and errors of their fixes."""
+    def _fixes(self, wake: Wake, states: TrafficStates) -> list[FloatArray]:
+        """Return velocities of everybody (3, rows, aircraft), and errors of their fixes.
+
+        The ownship is the first whoever looks.
+        """
         assert states.flights is not None
+        own, targets = _positions(states)
+        here = np.concatenate([own[:, :, np.newaxis], targets], axis=2)
+        viewer = _place(states)
+        here[:, :, [0, viewer]] = here[:, :, [viewer, 0]]
         flights = states.flights.seen_from(-1)
         later = flights(states.columns, (wake.time_s + _STEP_S)[:, np.newaxis])
         there = np.concatenate(
@@ -139,8 +147,7 @@ class PositionExchange(Component):
         roster = roster if viewer < 0 else roster.seen_from(viewer)
         keys = np.append(target_keys((roster.own_name,)), roster.keys_of(states.columns))
         keys = np.broadcast_to(keys, here.shape[1:])
-        position_errors, velocity_errors = self._fix_errors(wake, keys)
-        return _way(here, there) / _STEP_S, position_errors, velocity_errors
+        return [_way(here, there) / _STEP_S, *self._fix_errors(wake, keys)]
 
     def _fix_errors(self, wake: Wake, keys: AnyArray) -> list[FloatArray]:
         """Return errors of position and of velocity, (2, rows, aircraft) each: east and north."""
@@ -164,14 +171,21 @@ def _place(states: TrafficStates) -> int:
     return 0 if viewer < 0 else int(np.searchsorted(states.columns, viewer)) + 1
 
 
-def _in_order(states: TrafficStates) -> FloatArray:
-    """Return positions of everybody (3, rows, aircraft), the ownship first whoever looks."""
-    own = np.stack([getattr(states, f"own_{name}") for name in POSITION_FIELDS])
-    targets = np.stack([getattr(states, name) for name in POSITION_FIELDS])
-    everybody = np.concatenate([own[:, :, np.newaxis], targets], axis=2)
-    viewer = _place(states)
-    everybody[:, :, [0, viewer]] = everybody[:, :, [viewer, 0]]
-    return everybody
+def _positions(states: TrafficStates) -> tuple[FloatArray, FloatArray]:
+    """Return positions of who looks (3, rows), and of the others (3, rows, targets)."""
+    own, targets = (
+        np.stack([getattr(states, f"{of}{name}") for name in POSITION_FIELDS])
+        for of in ("own_", "")
+    )
+    return own, targets
+
+
+def _split(everybody: FloatArray, viewer: int) -> tuple[FloatArray, FloatArray]:
+    """Return what is of who looks (..., 1), and of the others, the ownship in its place."""
+    others = everybody[:, :, 1:].copy()
+    if viewer:
+        others[:, :, viewer - 1] = everybody[:, :, 0]
+    return everybody[:, :, viewer : viewer + 1].copy(), others
 
 
 def _way(here: FloatArray, there: FloatArray) -> FloatArray:

@@ -45,6 +45,66 @@ class OfEachRun(Fleet):
         return self._targets.fixed_attitudes_rad(aircraft * self._width + self._index, time_s)
 
 
+class OfPlatforms(Fleet):
+    """The flights of platforms, a flight of the first in each run, then those of the next one."""
+
+    def __init__(self, flights: Sequence[Fleet], targets: Fleet, platforms: Sequence[int]) -> None:
+        self.own, self._flights, self._runs = flights[0], flights, len(flights[0])
+        self._targets, self._width = targets, len(targets) // self._runs
+        self._platforms = np.array(platforms)
+
+    def __len__(self) -> int:
+        return len(self._flights) * self._runs
+
+    def __getitem__(self, index: int) -> Any:  # type: ignore[override]
+        place, run = divmod(range(len(self))[index], self._runs)
+        return self._flights[place][run]
+
+    @cached_property
+    def max_speeds_mps(self) -> FloatArray:
+        """Largest speed of each along its path, shape (flights,)."""
+        return np.concatenate([flights.max_speeds_mps for flights in self._flights])
+
+    @cached_property
+    def intervals_present_s(self) -> FloatArray:
+        """First and last time at which each is there, shape (flights, 2)."""
+        return np.concatenate([flights.intervals_present_s for flights in self._flights])
+
+    def _split(self, aircraft: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+        """Return which are ownships, which targets, and which of the targets these are."""
+        place, run = np.divmod(aircraft, self._runs)
+        targets = place.nonzero()[0]
+        of = run[targets] * self._width + self._platforms[place[targets]]
+        return (place == 0).nonzero()[0], targets, of
+
+    def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states of flights (n,), each at a time (n,) of its own, in s."""
+        own, targets, of = self._split(aircraft)
+        if not len(targets):
+            return self.own.each(aircraft, time_s)
+        others = self._targets.each(of, time_s[targets])
+        if not len(own):
+            return others
+        parts = [self.own.each(aircraft[own], time_s[own]), others]
+        return assemble_rows([own, targets], parts)
+
+    def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return speeds over ground, asked for as in `each`; NaN where no script says them."""
+        own, targets, of = self._split(aircraft)
+        speed_mps = np.empty(len(aircraft))
+        speed_mps[own] = self.own.ground_speeds_mps(aircraft[own], time_s[own])
+        speed_mps[targets] = self._targets.ground_speeds_mps(of, time_s[targets])
+        return speed_mps
+
+    def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return fixed yaw, pitch and roll (3, n), asked for as in `each`; NaN where not fixed."""
+        own, targets, of = self._split(aircraft)
+        fixed_rad = np.empty((3, len(aircraft)))
+        fixed_rad[:, own] = self.own.fixed_attitudes_rad(aircraft[own], time_s[own])
+        fixed_rad[:, targets] = self._targets.fixed_attitudes_rad(of, time_s[targets])
+        return fixed_rad
+
+
 class WithOthers(Fleet):
     """Targets of which some fly otherwise: by index in a run, a fleet of one for each run."""
 
@@ -102,13 +162,15 @@ class FlownFlights:
     """The flights of all runs with the manoeuvres that came so far; see `messages.known_flights`.
 
     An ownship for each run, and the targets of run 0, those of run 1, and so on. `platforms` are
-    those that may be steered or looked from: the ownship (-1) first, and targets by their index,
-    one flight for each run. For other instants than those of rows, targets are there while the
+    those that may be steered or looked from: the ownship (-1) first, and targets by their index.
+    They are flown together: `fleet` has the first one's flight of each run, then the next one's.
+    For other instants than those of rows, targets are there while the
     `intervals` of who looks say that they may be near, and positions are those of the last
     publication at `rates_hz` (runs,). Nobody sees the targets that are `unseen`.
     """
 
-    platforms: Mapping[int, SteeredFleet]
+    fleet: SteeredFleet
+    platforms: tuple[int, ...]
     targets: Fleet
     crabbing: Sequence[Any] = ()
     intervals: Mapping[int, NearIntervals] = field(default_factory=dict)
@@ -121,18 +183,41 @@ class FlownFlights:
         """Return the flights of all runs, with the ownship and targets by index as platforms."""
         width = len(targets) // len(own)
         others = sorted({index for index in platforms if index >= 0})
-        fleets = {index: SteeredFleet(OfEachRun(targets, width, index)) for index in others}
-        return cls({-1: SteeredFleet(own), **fleets}, targets)
+        flights = [own, *(OfEachRun(targets, width, index) for index in others)]
+        every = -1, *others
+        fleet = SteeredFleet(OfPlatforms(flights, targets, every) if others else own)
+        return cls(fleet, every, targets)
 
     @property
-    def own(self) -> SteeredFleet:
-        """The ownships."""
-        return self.platforms[-1]
+    def runs(self) -> int:
+        """How many runs there are."""
+        return len(self.fleet) // len(self.platforms)
 
     @property
     def width(self) -> int:
-        """How many targets each run has."""
-        return len(self.targets) // len(self.own)
+        """Return the number of targets of a run."""
+        return len(self.targets) // self.runs
+
+    @cached_property
+    def place_of_target(self) -> IntArray:
+        """Return the index among platforms of each target of a run, 0 for no platform."""
+        places = np.zeros(self.width, dtype=np.int64)
+        places[list(self.platforms[1:])] = np.arange(1, len(self.platforms))
+        return places
+
+    def of_platform(self, platform: int) -> SteeredFleet:
+        """Return a platform's flights, one for each run."""
+        if len(self.platforms) == 1:
+            return self.fleet
+        begin = self.platforms.index(platform) * self.runs
+        return self.fleet.part(slice(begin, begin + self.runs), self.nominal(platform))
+
+    def nominal(self, platform: int) -> Fleet:
+        """Return a platform's flights without manoeuvres, one for each run."""
+        if platform >= 0:
+            return OfEachRun(self.targets, self.width, platform)
+        flights = self.fleet.nominal
+        return flights.own if isinstance(flights, OfPlatforms) else flights
 
     @property
     def traffic(self) -> object:
@@ -141,29 +226,27 @@ class FlownFlights:
 
     @property
     def manoeuvre_count(self) -> int:
-        """How many manoeuvres came so far, in all runs."""
-        return sum(int(fleet.manoeuvre_count.sum()) for fleet in self.platforms.values())
+        """Return the number of manoeuvres so far, in all runs."""
+        return int(self.fleet.manoeuvre_count.sum())
 
-    @property
-    def steered_targets(self) -> dict[int, SteeredFleet]:
+    @cached_property
+    def steered_targets(self) -> tuple[int, ...]:
         """The targets that have got manoeuvres in any run, by their index."""
-        return {
-            index: fleet
-            for index, fleet in self.platforms.items()
-            if index >= 0 and fleet.manoeuvre_count.any()
-        }
+        count = self.fleet.manoeuvre_count.reshape(len(self.platforms), -1).sum(axis=1)
+        of_each = zip(self.platforms, count.tolist(), strict=True)
+        return tuple(index for index, many in of_each if index >= 0 and many)
 
     def seen_from(self, viewer: int) -> tuple[Fleet, Fleet]:
         """Return the viewing platform's flight and its targets' flights, without manoeuvres."""
-        own = self.platforms[viewer].nominal
         if viewer < 0:
-            return own, self.targets
-        return own, WithOthers(self.targets, self.width, {viewer: self.own.nominal})
+            return self.nominal(viewer), self.targets
+        others = {viewer: self.nominal(-1)}
+        return self.nominal(viewer), WithOthers(self.targets, self.width, others)
 
     def as_flown(self) -> Fleet:
         """Return the flights of the targets with all manoeuvres."""
-        steer = self.steered_targets
-        return WithOthers(self.targets, self.width, steer) if steer else self.targets
+        steered = {index: self.of_platform(index) for index in self.steered_targets}
+        return WithOthers(self.targets, self.width, steered) if steered else self.targets
 
     def platform_at(
         self,
@@ -176,11 +259,22 @@ class FlownFlights:
         """Return the states of a platform in runs (n,), each at a time (n,) of its own, by the
         first `known` of its manoeuvres, or all; `state` is what is known of them but for the wind.
         """
-        fleet = self.platforms[platform]
-        state = fleet.each(run, time_s, known) if state is None else state
+        place = self.platforms.index(platform)
+        return self._flown_at(run + place * self.runs if place else run, time_s, known, state)
+
+    def _flown_at(
+        self,
+        number: IntArray,
+        time_s: FloatArray,
+        known: IntArray | None,
+        state: TrajectoryState | None = None,
+    ) -> TrajectoryState:
+        """Return the states of flights of the fleet, as in `platform_at`."""
+        fleet = self.fleet
+        state = fleet.each(number, time_s, known) if state is None else state
         for crabbing in self.crabbing:
-            speed_mps = fleet.ground_speeds_mps(run, time_s, known)
-            state = crabbing(state, speed_mps, fleet.fixed_attitudes_rad(run, time_s, known))
+            speed_mps = fleet.ground_speeds_mps(number, time_s, known)
+            state = crabbing(state, speed_mps, fleet.fixed_attitudes_rad(number, time_s, known))
         return state
 
     def targets_at(
@@ -194,18 +288,19 @@ class FlownFlights:
         known of them but for manoeuvres and the wind. Of manoeuvres the first `known` (n,
         platforms) count, or all.
         """
-        if not (steered := self.steered_targets):
+        if not self.steered_targets:
             return self._as_scripted(target, time_s, state)
         run, column = np.divmod(target, self.width)
-        left = np.flatnonzero(~np.isin(column, list(steered)))
+        place = self.place_of_target[column]
+        mine, left = place.nonzero()[0], (place == 0).nonzero()[0]
+        place = place[mine]
+        counts = None if known is None else known[mine, place]
+        flown = self._flown_at(place * self.runs + run[mine], time_s[mine], counts)
+        if not len(left):
+            return flown
         known_of = None if state is None else state.taken(left)
-        rows, states = [left], [self._as_scripted(target[left], time_s[left], known_of)]
-        for place, index in enumerate(self.platforms):
-            if index in steered and len(mine := np.flatnonzero(column == index)):
-                counts = None if known is None else known[mine, place]
-                rows.append(mine)
-                states.append(self.platform_at(index, run[mine], time_s[mine], counts))
-        return assemble_rows(rows, states)
+        others = self._as_scripted(target[left], time_s[left], known_of)
+        return assemble_rows([left, mine], [others, flown])
 
     def _as_scripted(
         self, target: IntArray, time_s: FloatArray, state: TrajectoryState | None
@@ -279,7 +374,7 @@ class FlownFlights:
     def _looking(
         self, viewer: int, run: IntArray, known: IntArray, time_s: FloatArray
     ) -> TrajectoryState:
-        mine = known[..., list(self.platforms).index(viewer)]
+        mine = known[..., self.platforms.index(viewer)]
         runs, counts = (np.broadcast_to(of, time_s.shape).reshape(-1) for of in (run, mine))
         state = self.platform_at(viewer, runs, time_s.reshape(-1), counts)
         return state.reshape(time_s.shape)

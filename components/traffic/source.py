@@ -142,7 +142,7 @@ class TrafficSource(Component):
         return [self.targets[viewer], *(of for _, of in sorted({**others, viewer: own}.items()))]
 
     def offer(self, port: str) -> KnownTraffic:
-        """Say what the targets are, and where they can be; to all blocks the same.
+        """Return the targets and where they can be, the same for all consumers.
 
         Who went by where targets can be must show as replicas compare it.
         """
@@ -179,7 +179,7 @@ class TrafficSource(Component):
         self.says_truth = truth_is_recorded(self.context, len(self.roster))
         self._fly(self._flights([*asked, *self._steers.values()]), self.roster, [self.p])
         if self.context.producers:
-            self.own = SteeredFlight(self.own, self._flown.own)
+            self.own = SteeredFlight(self.own, self._flown.fleet)
 
     def _index(self, platform: str) -> int:
         """Return which target a platform is; -1 for the ownship."""
@@ -198,7 +198,7 @@ class TrafficSource(Component):
         return FlownFlights.of(fleet_of([self.own]), self.targets, platforms)
 
     def _fly(self, flights: FlownFlights, roster: Roster, parameters: Sequence[Any]) -> None:
-        """Take the flights of all runs, of which this one is the first, and how they publish."""
+        """Store the flights of all runs from this one on, and how they are published."""
         self.roster = roster
         rates = [p.update_rate_hz for p in parameters]
         rates_hz = None if None in rates else np.array(rates, dtype=np.float64)
@@ -250,7 +250,7 @@ class TrafficSource(Component):
         for number in range(len(parameters)):
             self._check_terrain(partial(_states_of_one, flights.own, number))
         of_all = copy(self)
-        flown = FlownFlights.of(flights.own, flights.targets, [*self._flown.platforms])
+        flown = FlownFlights.of(flights.own, flights.targets, self._flown.platforms)
         of_all._fly(flown, flights.roster, parameters)
         return of_all
 
@@ -276,13 +276,13 @@ class TrafficSource(Component):
         return min(most, len(self.roster))
 
     def left_out(self) -> list[str]:
-        """Say how far targets matter."""
+        """Return a sentence on the range beyond which targets are left out."""
         return [view.left_out(self.roster.names) for view in self._views if view.culls]
 
     def run(self, wake: Wake) -> Message | None:
         """Return the state of all aircraft that may matter, at every instant."""
         # Flights that all runs share are those of one.
-        run = wake.run if len(self._flown.own) > 1 else runs_of_single(len(wake))
+        run = wake.run if self._flown.runs > 1 else runs_of_single(len(wake))
         time_s = wake.time_s
         known = self._steer(wake, run)
         flown = self._flown
@@ -308,36 +308,38 @@ class TrafficSource(Component):
         )
 
     def _steer(self, wake: Wake, run: IntArray) -> IntArray:
-        """Let platforms fly what has come; return how many manoeuvres of each every row knows."""
+        """Steer platforms by the manoeuvres that came; return the number known to each row."""
         self._pending = Coming.concatenate([self._pending, *arrived_manoeuvres(wake, self._steers)])
+        flown = self._flown
+        fleet, runs = flown.fleet, flown.runs
+        each = run[:, np.newaxis] + runs * np.arange(len(flown.platforms))
         if not len(self._pending):
-            counts = [fleet.manoeuvre_count[run] for fleet in self._flown.platforms.values()]
-            return np.array(counts).T
+            return fleet.manoeuvre_count[each]
         due, self._pending = due_manoeuvres(wake, self._pending)
-        platforms, known = dict(self._flown.platforms), []
-        for platform, fleet in platforms.items():
-            mine = due.take(due.platform == platform)
-            if platform >= 0:  # who is not there is not steered
-                from_s, until_s = fleet.nominal.intervals_present_s[mine.replica].T
-                time_s = mine.tick / wake.ticks_per_s
-                mine = mine.take((from_s <= time_s) & (time_s <= until_s))
-            platforms[platform], count = steer(fleet, mine, wake, run)
-            known.append(count)
-            for view in self._views:
-                if view.viewer == platform and view.epochs is not None:
-                    for run_of, tick in zip(mine.replica.tolist(), mine.tick.tolist(), strict=True):
-                        view.epochs.forget(run_of, tick / wake.ticks_per_s)
-        self._flown = replace(self._flown, platforms=platforms)
+        flights = np.searchsorted(flown.platforms, due.platform) * runs + due.replica
+        time_s = due.tick / wake.ticks_per_s
+        there = due.platform < 0
+        if not there.all():  # who is not there is not steered; the ownship always is
+            from_s, until_s = fleet.nominal.intervals_present_s[flights].T
+            there |= (from_s <= time_s) & (time_s <= until_s)
+            due, flights = due.take(there), flights[there]
+        fleet, known = steer(fleet, flights, due, wake, each)
+        for view in self._views:
+            if view.epochs is not None:
+                mine = due.take(due.platform == view.viewer)
+                for run_of, tick in zip(mine.replica.tolist(), mine.tick.tolist(), strict=True):
+                    view.epochs.forget(run_of, tick / wake.ticks_per_s)
+        self._flown = replace(flown, fleet=fleet)
         assert isinstance(self.own, SteeredFlight)
-        self.own = SteeredFlight(self.own.flight, self._flown.own)
+        self.own = SteeredFlight(self.own.flight, fleet)
         self.targets = self._flown.as_flown()
-        return np.stack(known, axis=1)
+        return known
 
     def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return the states (rows, columns) of targets of each row's run."""
         flown, shape = self._flown, (len(time_s), len(columns))
         state: TrajectoryState | None = None
-        if len(flown.own) == 1:
+        if flown.runs == 1:
             if not np.array_equal(columns, self._moved[0]):
                 self._moved = columns, flown.targets.subset(columns)
             state = self._moved[1].at(time_s)
@@ -376,7 +378,7 @@ class TrafficSource(Component):
         own, targets, names = self.own, self.targets, [*self.roster.names]
         if viewer >= 0:  # it and the ownship change places
             own, names[viewer] = targets[viewer], self.roster.own_name
-            targets = WithOthers(targets, len(targets), {viewer: self._flown.own})
+            targets = WithOthers(targets, len(targets), {viewer: self._flown.of_platform(-1)})
         times = self._compared_at(end_s)
         between = not self._seeks_at_samples
         best = approaches_of_run(own, targets, times, end_s, between=between)
@@ -394,7 +396,7 @@ class TrafficSource(Component):
 
     @property
     def _seeks_at_samples(self) -> bool:
-        """Whether a scene says at which spacing closest approaches are sought."""
+        """Return whether the scene sets the spacing at which closest approaches are sought."""
         return hasattr(self.p, "sample_interval_s")
 
     def _compared_at(self, end_s: float) -> list[SampleTimes]:

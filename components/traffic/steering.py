@@ -13,6 +13,7 @@ from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Producer
 from dsa_des.block.wake import Wake
+from dsa_des.time.clock import MAX_TICK
 
 
 def steered_platforms(
@@ -82,23 +83,20 @@ def due_manoeuvres(wake: Wake, pending: Coming) -> tuple[Coming, Coming]:
 
 
 def steer(
-    own: SteeredFleet, due: Coming, wake: Wake, run: IntArray
+    fleet: SteeredFleet, flights: IntArray, due: Coming, wake: Wake, each: IntArray
 ) -> tuple[SteeredFleet, IntArray]:
-    """Return a platform that flies what has come, and how many manoeuvres each row of runs knows.
+    """Return a fleet whose `flights` fly what has come, and how many manoeuvres each row knows.
 
-    A row knows the manoeuvres that have come by its own instant, whatever came later in this wake.
+    `each` (rows, platforms) are the flights that a row speaks of. It knows the manoeuvres that have
+    come by its own instant, whatever came later in this wake.
     """
-    known: IntArray = own.manoeuvre_count[run]
-    for one in turns(due.replica):  # the first of every run, then the next
-        ownship, ticks = due.replica[one], due.tick[one]
-        own = own.add_manoeuvres(ownship, ticks / wake.ticks_per_s, due.manoeuvre[:, one].T)
-        known = known + _is_at_or_after(run, wake.ticks, ownship, ticks)
-    return own, known
-
-
-def _is_at_or_after(run: IntArray, ticks: IntArray, ownship: IntArray, came: IntArray) -> IntArray:
-    """Return 1 for the rows of some ownships at or after what came for each of them."""
-    order = np.argsort(ownship)
-    index = np.minimum(np.searchsorted(ownship[order], run), len(ownship) - 1)
-    mine = order[index]
-    return ((ownship[mine] == run) & (ticks >= came[mine])).astype(np.int64)
+    known: IntArray = fleet.manoeuvre_count[each]
+    for one in turns(flights):  # the first of every flight, then the next
+        ticks = due.tick[one]
+        fleet = fleet.add_manoeuvres(
+            flights[one], ticks / wake.ticks_per_s, due.manoeuvre[:, one].T
+        )
+        came = np.full(len(fleet), MAX_TICK)
+        came[flights[one]] = ticks
+        known += wake.ticks[:, np.newaxis] >= came[each]
+    return fleet, known

@@ -53,11 +53,11 @@ class View:
 
     @property
     def culls(self) -> bool:
-        """Whether any target may be left out."""
+        """Return whether any target may be left out."""
         return self.intervals is not None or self.epochs is not None
 
     def left_out(self, names: Sequence[str]) -> str:
-        """Say how far targets of these names matter."""
+        """Return a sentence on the range beyond which targets of these names are left out."""
         whose = "" if self.viewer < 0 else f" on {names[self.viewer]}"
         return (
             f"targets beyond {self.reach_m[0] / 1000.0:.2f} km: not moved, no sensor{whose} looks "
@@ -70,9 +70,10 @@ class View:
         """Return the state of the ownship, if it looks, at each row, which targets may come in the
         reach of who looks, and when (rows, targets); None for always.
         """
-        every, lasts_s, one_run = np.arange(self._width), self.look.lasts_s, len(flown.own) == 1
+        every, lasts_s, one_run = np.arange(self._width), self.look.lasts_s, flown.runs == 1
         if self.epochs is not None:
-            state, near = self.epochs.states_and_near(flown.platforms[self.viewer], run, time_s)
+            looking = flown.of_platform(self.viewer)
+            state, near = self.epochs.states_and_near(looking, run, time_s)
             near[:, self._steered] = True
             columns = np.flatnonzero(near.any(axis=0)) if one_run else every
             return self._own(flown, run, time_s, state), columns, near[:, columns]

@@ -77,20 +77,22 @@ class KeyedTable:
             return self
         return self.take(np.argsort(self.replica, kind="stable"))
 
-    def _is_one_run(self, runs: IntArray) -> bool:
-        """Whether all, which is in order, is of one run, the only one of some: the usual case."""
+    def _is_of(self, runs: IntArray) -> bool:
+        """Whether all is of some runs, the usual case: of the only one, or a row of each."""
         replica = self.replica
-        return bool(len(replica) and replica[0] == replica[-1] == runs[0] == runs[-1])
+        if not len(replica) or replica[0] != runs[0] or replica[-1] != runs[-1]:
+            return False
+        return bool(replica[0] == replica[-1] or np.array_equal(replica, runs))
 
     def rows_of_runs(self, runs: IntArray) -> Self:
         """Return the rows of some runs, which are in order."""
-        if len(self) == 0 or self._is_one_run(runs):
+        if len(self) == 0 or self._is_of(runs):
             return self
         return self.take(np.isin(self.replica, runs))
 
     def replace_runs(self, runs: IntArray, newer: Self, first_run: int) -> Self:
         """Replace the rows of some runs by `newer`; drop runs before the first."""
-        if len(self) == 0 or self._is_one_run(runs):
+        if len(self) == 0 or self._is_of(runs):
             return newer.sort()
         others = (self.replica >= first_run) & ~np.isin(self.replica, runs)
         return self.concatenate([self.take(others), newer]).sort()
@@ -98,6 +100,8 @@ class KeyedTable:
     def latest_or_new(self, new: Self) -> Self:
         """Return each run's row: this table's, or the row of `new` where this has none."""
         old = self.rows_of_runs(new.replica)
+        if len(old) == len(new):
+            return self.from_columns({name: old.columns[name].copy() for name in new.columns})
         here = np.searchsorted(new.replica, old.replica)
         columns = {name: values.copy() for name, values in new.columns.items()}
         for name, values in columns.items():

@@ -131,6 +131,8 @@ class Recorder:
         self._ends: Runs | None = None
         #: Rows and pieces noted since some were handed on; more where a window was undone.
         self._noted = [0, 0]
+        #: The run before which all was handed on.
+        self._handed_on = 0
 
     @property
     def wanted_tables(self) -> Collection[str] | None:
@@ -255,10 +257,13 @@ class Recorder:
     def advance(self, run: int, tick: int) -> None:
         """Pass on the rows before a tick of a run, once there are enough; no more will come."""
         if self._noted[0] >= _ROWS_AT_ONCE or self._noted[1] >= _PIECES_AT_ONCE:
-            self._flush_before(run, tick)
+            self._noted = [0, 0]
+            self._build_pieces()
+            if tick > 0 or run > self._handed_on:  # else runs in lock step are all under way
+                self._flush_before(run, tick)
 
     def _flush_before(self, run: int, tick: int) -> None:
-        self._noted = [0, 0]
+        self._handed_on = run
         self._build_pieces()
         for table, pieces in self._pending.items():
             ready: list[tuple[str, Columns]] = []

@@ -16,7 +16,13 @@ def test_runs_of_a_cell_count_together_and_are_held_against_the_published_ones()
     rings = {"aircraft": 8, "error_m": 5, "well_clear_lost_mitigated": [1.0] * 50 + [0.0] * 50}
     studies = [first, more, pd.DataFrame(rings)]
     assert counted(studies) == {("pair, 90°", 30): (4, 2000), ("ring of 8", 5): (50, 100)}
-    pair, ring = rows(studies)[2:]
+    name, split = "well_clear_lost_mitigated", {"crossing_deg": 180, "error_m": 10}
+    split |= {name: [2e-5, 4e-5], f"{name}.runs": 500.0, f"{name}.unseen": 0.0}
+    studies.append(pd.DataFrame(split | {f"{name}.collapsed": 0.0}))
+    pair, ring, of_repetitions = rows(studies)[2:]
+    assert of_repetitions.startswith(
+        "| pair, 180° | 10 | split, 0 of 2 collapsed | 1,000 | 3.00e-5 ("
+    )
     # Wilson's interval of 4 of 2,000 holds 61 of 54,900, whose own ends at 1.43e-3.
     assert pair == (
         "| pair, 90° | 30 | 4 | 2,000 | 2.00e-3 (7.78e-4 to 5.13e-3) | "
