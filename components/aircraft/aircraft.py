@@ -257,7 +257,7 @@ class Roster:
 
     @cached_property
     def equipage(self) -> Equipage:
-        """What all aircraft carry for others to know them by, then what they do later."""
+        """Return what surveillance equipment each aircraft carries, and how that changes later."""
         every = [*self.aircraft, *(one for _, then in self.later for one in then.aircraft)]
         return Equipage.from_aircraft(every, np.tile(self.keys, len(every) // max(1, len(self))))
 
@@ -270,7 +270,7 @@ class Roster:
 
     @cached_property
     def ever_broadcasts(self) -> BoolArray:
-        """Which aircraft send ADS-B at some time, shape (targets,)."""
+        """Return whether each aircraft sends ADS-B at any time of the run, shape (targets,)."""
         return np.asarray(self.equipage.ads_b.reshape(1 + len(self.later), -1).any(axis=0))
 
     @cached_property
@@ -285,12 +285,12 @@ class Roster:
 
     @cached_property
     def swerling_models(self) -> tuple[int, ...]:
-        """Which models there are, ascending, 5 written as 0."""
+        """Return the numbers of the Swerling models that occur, ascending; 5 is written as 0."""
         return tuple(sorted({craft.swerling % 5 for craft in self.aircraft}))
 
     @property
     def is_shared(self) -> bool:
-        """Whether all replicas have the same aircraft."""
+        """Return whether all replicas have the same aircraft."""
         return len(self.aircraft) == len(self.names)
 
     def craft(self, target: IntArray, replica: IntArray) -> IntArray:

@@ -55,12 +55,12 @@ class BelievedPositions:
         return count_not_judged(self._rangeless, self._unmoving)
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
-        """Take in positions (n, targets, 3) at instants of their run, and when they came."""
+        """Store true target positions (n, targets, 3) at run times, and when each message came."""
         position = np.moveaxis(position_m, 0, -1)
         self._seen = self._seen.append(came, time_s=time_s, position_m=position)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
-        """Take in what was measured in body axes, by the attitude of when it was measured."""
+        """Store measurements in body axes, turned by the attitude at their own instants."""
         sights: Tracks | FusedDetections = arrived.message
         row = sights.row_of_entries
         new = sights.target >= 0

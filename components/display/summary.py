@@ -36,7 +36,7 @@ class SensorSummary:
         self._off = frozenset(off)
 
     def update(self, table: str, columns: Columns) -> None:
-        """Take rows of ``scans`` or ``detections``, in order of time."""
+        """Update the summary with rows of ``scans`` or ``detections``, in order of time."""
         for name, rows in rows_by_name(columns["block"]):
             entry = self._entries.setdefault(name, _Sensor())
             if table == "scans":
@@ -68,7 +68,7 @@ class FusedSummary:
         self._counts: dict[str, int] = {}
 
     def update(self, table: str, columns: Columns) -> None:
-        """Take rows of ``fused``."""
+        """Update the summary with rows of ``fused``."""
         for name, rows in rows_by_name(columns["sensors"]):
             self._counts[name] = self._counts.get(name, 0) + len(rows)
 

@@ -284,7 +284,7 @@ class ModelTraffic(_EncounterTraffic):
     )  # fmt: skip
 
     def warnings(self) -> list[str]:
-        """Note which units of the models are interpreted."""
+        """Return warnings on units of the encounter models that had to be interpreted."""
         models = dict.fromkeys((self.p.file, self.p.intruder_file or self.p.file))
         notes = [f"file {path}: {note}" for path in models for note in read_model(path).notes]
         return notes + super().warnings()
@@ -302,7 +302,7 @@ class ModelTraffic(_EncounterTraffic):
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
-        """Make the encounters and flights that many blocks will ask for, all at once."""
+        """Compute and cache the encounters and flights of many parameter sets at once."""
         _PAIRS.prepare([_pair_key(p) for p in parameters])
         super().prepare(parameters)
 

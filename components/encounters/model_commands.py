@@ -103,7 +103,7 @@ _Columns = dict[str, AnyArray]
 
 
 def _raw(model: EncounterModel, seed: int, numbers: range, seconds: int) -> Iterator[_Columns]:
-    """Give what the network gave, before any rejection."""
+    """Yield columns as sampled by the network, before any rejection."""
     sampler = TrackSampler(model, EncounterDraws(seed, TRACKS))
     for tracks in sampler.batches(numbers, seconds):
         yield _variables(model, tracks, seconds)
@@ -130,7 +130,7 @@ def _variables(model: EncounterModel, tracks: SampledTracks, seconds: int) -> _C
 def _fly_tracks(
     model: EncounterModel, seed: int, numbers: range, seconds: int, dynamics: str
 ) -> Iterator[_Columns]:
-    """Give accepted tracks with the positions they fly through, once per second."""
+    """Yield accepted tracks with the positions that they fly through, once per second."""
     sampler = TrackSampler(model, EncounterDraws(seed, TRACKS))
     rules = TrackRules(model)
     for tracks, flown in sample_accepted_tracks(sampler, rules, numbers, seconds, dynamics):

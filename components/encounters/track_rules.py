@@ -246,7 +246,7 @@ def conditional(network: BayesNetwork, given: list[int], index: int) -> FloatArr
 def sample_accepted_tracks(
     sampler: TrackSampler, rules: TrackRules, numbers: range, seconds: int, dynamics: str
 ) -> Iterator[tuple[SampledTracks, FlownTracks]]:
-    """Give accepted tracks with their flights, in batches in order of their numbers."""
+    """Yield accepted tracks with their flights, in batches in order of their numbers."""
     for start in range(0, len(numbers), _TRACKS_AT_ONCE):
         some = numbers[start : start + _TRACKS_AT_ONCE]
         kept: SampledTracks | None = None

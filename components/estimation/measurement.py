@@ -33,7 +33,7 @@ class Kind:
 
     @property
     def size(self) -> int:
-        """How many quantities there are."""
+        """Return the number of quantities."""
         return 2 + self.has_range + self.has_range_rate + 3 * self.has_velocity
 
 

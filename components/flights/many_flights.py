@@ -368,7 +368,7 @@ class SteeredFlight:
 
     @property
     def parts(self) -> Parts:
-        """What it flies after its manoeuvres, and from when on, s."""
+        """Return the flown path after manoeuvres, with the time (s) from which each part holds."""
         return self._fleet.parts_of(self._number)
 
     @property

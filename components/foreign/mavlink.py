@@ -226,7 +226,7 @@ class Mavlink(Component):
         return found
 
     def _take(self, time_s: float) -> None:
-        """Take all that has come; wait for what answers this instant where that is asked for."""
+        """Read all messages that have come; wait for this instant's reply if one is required."""
         # Its own times are whole milliseconds.
         wanted_s = math.floor(1e3 * time_s) / 1e3
         until = time.monotonic() + self.p.answer_s

@@ -103,7 +103,7 @@ class ProcessParameters(Parameters):
         return shutil.which(str(beside.absolute()) if "/" in name else name)
 
     def without_effect(self) -> list[str]:
-        """Say which keys change nothing."""
+        """Return a sentence for each key that has no effect."""
         said = [] if self.on_failure == "restart" else self.idle(
             "most_restarts", because='as on_failure is "stop"'
         )  # fmt: skip
@@ -146,7 +146,7 @@ class Process(Component):
         return None if rate is None else ClockSpec(rate, parameters.offset_s)
 
     def offer(self, port: str) -> Any:
-        """Say that detections may have a range; of the rest, nothing."""
+        """Return that detections may have a range, and nothing about their accuracy."""
         return (
             SensorOffer(measures_range=True, resolution_rad=0.0) if port == "detections" else None
         )
@@ -173,7 +173,7 @@ class Process(Component):
     # -- calls ---------------------------------------------------------------------------------
 
     def run(self, wake: Wake) -> Mapping[str, Message] | None:
-        """Ask the program at every instant of the wake."""
+        """Send the inputs of every instant of the wake-up to the program; return its answers."""
         parts: dict[str, list[Message]] = {}
         arrivals = wake.arrivals("received")
         for row, tick in enumerate(wake.ticks.tolist()):

@@ -61,7 +61,7 @@ class ProcessLink:
 
     @property
     def runs(self) -> bool:
-        """Whether it was started and not ended since."""
+        """Return whether the program was started and has not ended since."""
         return self._process is not None
 
     def start(self) -> None:
@@ -195,11 +195,11 @@ class _Frames:
 
     @property
     def is_partial(self) -> bool:
-        """Whether something came, and not all."""
+        """Return whether part of a frame has come, but not all."""
         return bool(self._head or self._frames or self._body is not None)
 
     def add(self, content: bytes) -> None:
-        """Take bytes."""
+        """Append received bytes."""
         view = memoryview(content)
         while len(view):
             if self.done:

@@ -74,7 +74,7 @@ class _Table:
     word: str = "line"
 
     def add(self, row: int, column: str, what: str) -> None:
-        """Note a problem of a cell."""
+        """Add a problem of a cell."""
         if self.word == "line":
             self.problems.add(what, line=int(self.line[row]), column=column)
         else:

@@ -60,7 +60,7 @@ UNKNOWN_JSON = (
 def json_documents(
     problems: Problems, data: bytes, warnings: list[str]
 ) -> Iterator[tuple[int, Any]]:
-    """Give JSON documents that stand one after another, and where they begin; of a list its parts.
+    """Yield consecutive JSON documents and their offsets; of a list, its elements.
 
     A last line that is cut off, of a history that is being written, is left out with a warning.
     """
@@ -167,7 +167,7 @@ def _reports_of_documents(
     reader: _Reader,
     callsigns: dict[str, str],
 ) -> Reports:
-    """Give the reports of documents; a position that is still the last one is given once."""
+    """Return the reports of documents, without repetitions of the last position."""
     last: dict[str, PositionReport] = {}
     for number, one in documents:
         if not isinstance(one, dict) or not marks <= one.keys():
@@ -194,7 +194,7 @@ _ROUNDED_S = 0.25
 
 
 def _is_again(sample: PositionReport, before: PositionReport) -> bool:
-    """Tell whether two reports are of one position."""
+    """Return whether two reports are of one position."""
     return (sample.lat, sample.lon) == (before.lat, before.lon) and (
         sample.time == before.time or abs(sample.time - before.time) <= _ROUNDED_S
     )
@@ -209,7 +209,7 @@ def _subtract_age(time_s: Any, age_s: Any) -> Any:
 
 
 def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
-    """Give the aircraft of an ``aircraft.json``, when their positions were received."""
+    """Yield the position reports of an ``aircraft.json``, at the times of their reception."""
     for craft in one["aircraft"]:
         name = str(craft["hex"])
         if craft.get("flight"):
@@ -224,7 +224,7 @@ def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[
 
 
 def _of_interface(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
-    """Give the aircraft that ADS-B Exchange and others answer with: as readsb's, the time in ms."""
+    """Yield the aircraft in an answer of ADS-B Exchange: as readsb's, with the time in ms."""
     yield from _of_aircraft({"now": one["now"] / 1000.0, "aircraft": one["ac"]}, callsigns)
 
 
@@ -233,7 +233,7 @@ _GEOMETRIC = 8
 
 
 def _of_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
-    """Give the points of a trace: seconds after its timestamp, position, altitude, and more."""
+    """Yield the points of a trace: seconds after its timestamp, position, altitude, and more."""
     name = str(one["icao"])
     for point in one["trace"]:
         after_s, lat, lon, alt, gs, trk, flags, climb, more = point[:9]
@@ -249,7 +249,7 @@ def _of_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Pos
 
 
 def _of_path(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
-    """Give the points of a flight that OpenSky tells, which have no speeds."""
+    """Yield the points of a flight path from OpenSky, which have no speeds."""
     name = str(one["icao24"])
     if one.get("callsign"):
         callsigns[name] = str(one["callsign"]).strip()
@@ -258,7 +258,7 @@ def _of_path(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Posi
 
 
 def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
-    """Give OpenSky's state vectors, at the instants of their positions."""
+    """Yield OpenSky's state vectors, at the instants of their positions."""
     for state in one["states"] or ():
         name, callsign, _, time_s, _, lon, lat, barometric, _, gs, trk, climb = state[:12]
         if callsign:
@@ -268,7 +268,7 @@ def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Po
 
 
 def _of_feed(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
-    """Give all aircraft of FlightRadar24's live feed, each a list by the number of its flight."""
+    """Yield all aircraft of FlightRadar24's live feed, each a list keyed by its flight number."""
     for state in one.values():
         if isinstance(state, list):
             address, lat, lon, trk, alt, gs, _, _, _, _, time_s, _, _, _, ground, climb, called = (
@@ -283,7 +283,7 @@ def _of_feed(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Posi
 
 
 def _of_playback(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
-    """Give the points of a flight that FlightRadar24 plays back, of which 0 ft is the ground."""
+    """Yield the points of a FlightRadar24 playback, in which 0 ft means on the ground."""
     flight = one["result"]["response"]["data"]["flight"]
     called = flight["identification"]
     name = str(flight["aircraft"]["identification"].get("modes") or called["id"])
@@ -297,7 +297,7 @@ def _of_playback(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[
 
 
 def _of_details(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
-    """Give the trail of a flight among FlightRadar24's details of it, which has no climb."""
+    """Yield the trail in FlightRadar24's details of a flight, which has no climb rate."""
     called = one["identification"]
     name = str((one.get("aircraft") or {}).get("hex") or called["id"])
     callsigns[name] = str(called["callsign"] or "")

@@ -309,7 +309,7 @@ class SampleTable:
         return first
 
     def _note_second_columns(self) -> None:
-        """Say which of two columns is read, for whom the other, and how far they are apart."""
+        """Add a note where two columns hold one quantity: which is read, how far they differ."""
         for key, other in self._instead.items():
             first, second = self._columns[key].header, self._columns[other].header
             if whom := self._second.get(key, []):
@@ -366,7 +366,7 @@ class SampleTable:
     def _sort_by_time(
         self, name: str, lines: IntArray, columns: dict[str, FloatArray]
     ) -> dict[str, FloatArray]:
-        """Put an aircraft's samples in the order of time; two places at one time are a problem."""
+        """Return an aircraft's samples by time; add a problem for two places at one time."""
         if not len(lines):
             return {}
         if np.any(columns["time"][1:] < columns["time"][:-1]):
@@ -411,7 +411,7 @@ class SampleTable:
     def _refuse_long_silence(
         self, kept: Mapping[str, tuple[IntArray, dict[str, FloatArray]]]
     ) -> None:
-        """Note times after which the whole file falls silent for too long."""
+        """Add a problem for each time after which the whole file has no samples for too long."""
         times = np.concatenate([columns["time"] for _, columns in kept.values()])
         times.sort()
         for i in np.flatnonzero(np.diff(times) > _LONGEST_SILENCE_S):

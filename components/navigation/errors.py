@@ -173,7 +173,7 @@ class _Navigation(Effect[Built]):
     outside_the_proof = "it fills columns that are null without it"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``[navigation]``."""
+        """Return whether navigation errors are simulated: needs ``[navigation]``."""
         errors = _errors_of(block.context)
         if errors:
             return Verdict(True, f"[navigation] {' and '.join(errors)}")

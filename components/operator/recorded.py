@@ -162,7 +162,7 @@ class RecordedOperator(Console):
         return list(zip(at.tolist(), self._decided[first : self._next], strict=True))
 
     def warnings(self) -> list[str]:
-        """Say what comes too late to be decided in this run."""
+        """Return a warning on each decision that comes after the end of the run."""
         end = float(self.context.duration_s * self.context.ticks_per_s)
         late = int(np.count_nonzero(self._ticks >= end))
         return [f"decisions: {late} of {len(self._ticks)} come after the end"] if late else []

@@ -238,7 +238,7 @@ class FrameFalseAlarms(Effect[Reporting]):
     builds = AddedFalseAlarms
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``false_alarms`` and ``false_alarms_per_frame``."""
+        """Return whether false alarms are simulated: by ``false_alarms``, or by their number."""
         p = block.p
         if not p.enabled:
             return Verdict(False, "enabled is false")

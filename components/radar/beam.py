@@ -326,7 +326,7 @@ class SweepingSensor(Sensor):
         return [*super().records(), *([] if self._sweep is None else [OwnOfEntries])]
 
     def request(self, port: str) -> Any:
-        """Ask for the targets in our reach; a sweep decides for itself when that is."""
+        """Return a request for the targets in reach, at the times at which the sweep meets them."""
         reach = super().request(port)
         if self._sweep is None or not self.p.enabled:
             return reach

@@ -129,7 +129,7 @@ class FalseAlarms(Effect[Reporting]):
     outside_the_proof = "a report without false alarms is what there is without it"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``false_alarms``, and whether the radar is switched on."""
+        """Return whether false alarms are simulated: needs ``false_alarms``, a radar that is on."""
         if block.p.false_alarms and not block.p.enabled:
             return Verdict(False, "enabled is false")
         return Verdict.of_flag(block.p, "false_alarms")
@@ -264,7 +264,7 @@ class GroundReports:
     def _lit_cells(
         self, own_alt_m: float, elevation_rad: FloatArray
     ) -> Iterator[tuple[int, IntArray, FloatArray]]:
-        """Give each range cell with clutter, the beams that meet it, and where they point."""
+        """Yield each range cell with clutter, the beams that meet it, and their directions."""
         if any(echo.diffuse for echo in self._block.echoes):
             everywhere = np.arange(len(elevation_rad))
             for depth in range(len(self._range_m)):
@@ -319,7 +319,7 @@ class ClutterAlarms(Effect[Reporting]):
     outside_the_proof = "a report without the ground is what there is without it"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``false_alarms``, ground, and a threshold that it crosses."""
+        """Return whether clutter causes alarms: needs ``false_alarms``, ground and a threshold."""
         p = block.p
         if not (p.false_alarms and p.enabled):
             return Verdict(False, "false_alarms is false" if p.enabled else "enabled is false")
@@ -341,7 +341,7 @@ NO_FALSE_ALARMS_PER_SCAN = 1e-6
 
 
 def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
-    """Say that a radar detects echoes below its noise, as so many false alarms are allowed."""
+    """Return a warning if the Pfa is so high that echoes below the noise are detected."""
     pfa = parameters.false_alarm_probability
     if pfa < HIGH_FALSE_ALARM_PROBABILITY or not math.isfinite(snr_db):
         return []
@@ -354,7 +354,7 @@ def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
 
 
 def unlikely_false_alarms(block: Any) -> list[str]:
-    """Say how many false alarms a scan has where there are many, or practically none."""
+    """Return a sentence on the number of false alarms, if that is large or practically 0."""
     if not (block.p.false_alarms and block.p.enabled):
         return []
     pfa, cells = block.crossing.false_alarm_probability, cells_of_radar(block).count

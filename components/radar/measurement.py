@@ -214,7 +214,7 @@ class MeasuredStrength(Effect[Strengthening]):
     outside_the_proof = "a radar always measures strength"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask whether the radar is switched on."""
+        """Return whether signal strength is measured: needs a radar that is switched on."""
         if not block.p.enabled:
             return Verdict(False, "enabled is false")
         return Verdict(True, "a radar measures strength as it measures places")
@@ -228,7 +228,7 @@ def _is_chosen(cells: IntArray, chosen: IntArray, count: int) -> IntArray:
 
 
 def noise_at_targets(parameters: Any) -> list[str]:
-    """Say that looks which noise decides are reported exactly at the target, where they are."""
+    """Return a warning where noise detections are reported exactly at the target."""
     steps = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
     exact = [step for step in steps if getattr(parameters, step) == 0]
     if parameters.errors != "grid" or not exact:

@@ -55,7 +55,7 @@ class RainClutter(Effect[Echo]):
     acts_on = CLUTTER
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``[weather] rain_rate_mm_h``, and for a carrier and a cell."""
+        """Return whether rain clutter is simulated: needs rain, a carrier and a range cell."""
         rate = _rain_rate(block)
         because = f"[weather] rain_rate_mm_h is {rate:g}"
         somewhere = Verdict(False, "")
@@ -151,7 +151,7 @@ class SidelobeClutter(Effect[Echo]):
     acts_on = CLUTTER
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``sidelobe_level_db``, and for ground or rain."""
+        """Return whether sidelobes receive clutter: needs ``sidelobe_level_db``, ground or rain."""
         level_db = block.p.sidelobe_level_db
         if level_db is None:
             return Verdict(False, "sidelobe_level_db is not given")
@@ -236,7 +236,7 @@ class FoldedClutter(Effect[Echo]):
     acts_on = CLUTTER
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``range_folds``, and for ground or rain."""
+        """Return whether folded clutter is simulated: needs ``range_folds``, and ground or rain."""
         if not block.p.range_folds:
             return Verdict(False, "range_folds is false")
         rain = block.context.sections["weather"].rain_rate_mm_h

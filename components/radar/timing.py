@@ -128,7 +128,7 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
         return self
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to a budget of time, or to beams, that there are not."""
+        """Return a sentence for each key of a time budget or of beams that are switched off."""
         said = super().without_effect()
         if self.budget != "dwell":
             because = f"budget is {'not given' if self.budget is None else repr(self.budget)}"
@@ -175,7 +175,7 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
 
     @property
     def look_energy(self) -> LookEnergy | None:
-        """What a look consists of with ``budget = "dwell"``; None where the scan is free."""
+        """Return the pulses of a look with ``budget = "dwell"``; None where the scan is free."""
         beams = self.beams
         if self.budget != "dwell" or beams is None:
             return None
@@ -298,7 +298,7 @@ class TimeBudget(Effect[LookEnergy]):
     outside_the_proof = "with it the link budget is that of another look"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``budget``, and say how the beams share a scan."""
+        """Return whether beams share a scan's time, and how: needs ``budget``."""
         p = block.p
         if (look := p.look_energy) is not None:
             pulses = "" if look.pulses is None else f", pulses in it: {look.pulses}"

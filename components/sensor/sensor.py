@@ -154,7 +154,7 @@ class Sensor(Measuring):
         self._idle_run = -1
 
     def request(self, port: str) -> Any:
-        """Ask the block that feeds us for the targets in our reach."""
+        """Return a request for the targets in the sensor's reach."""
         slack, because = self.range_slack(), self.exact_because()
         return replace(self._reach_from_body, range_slack=slack, exact_because=because)
 
@@ -166,11 +166,11 @@ class Sensor(Measuring):
         return math.inf
 
     def exact_because(self) -> str:
-        """Say why only an exact line of sight will do, or nothing."""
+        """Return why only an exact line of sight will do, or an empty string."""
         return ""
 
     def offer(self, port: str) -> Any:
-        """Say whether we measure range, and how finely we measure angles."""
+        """Return what this sensor measures and how finely: ranges, angles and their variances."""
         resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
         constant: dict[str, Any] = constant_variances(self.p, self.steps)
         lasting = lasting_errors(self.p, self.steps)
@@ -204,13 +204,13 @@ class Sensor(Measuring):
 
     @cached_property
     def _message(self) -> type[Detections]:
-        """What is sent: `Detections`, or a subclass that declares columns of its own."""
+        """Return the class of sent messages: `Detections`, or a subclass with more columns."""
         message: type[Detections] = type(self).outputs["detections"].message  # type: ignore[assignment]
         return message
 
     @cached_property
     def _is_asked_for_looks(self) -> bool:
-        """Whether the scene asks for every look."""
+        """Return whether the scene records every look."""
         record = self.context.sections.get("record")
         return bool(record is not None and record.looks)
 

@@ -115,7 +115,7 @@ class AdsBParameters(CooperativeParameters):
         return self
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to a law of reception that is not taken."""
+        """Return a sentence for each key of a reception law that is not chosen."""
         said = super().without_effect()
         if self.reception != "fitted":
             around = "aircraft_around", "airports_around"
@@ -219,7 +219,7 @@ class AdsB(CooperativeSensor):
         return bool(self.p.heights == "geometric")
 
     def offer(self, port: str) -> Any:
-        """Say that all variances differ from report to report."""
+        """Return the sensor's declaration: range rates, no fixed variances, lasting errors."""
         offer: SensorOffer = super().offer(port)
         errs = self.p.position_errors != "none" or self.p.compact or self.p.pressure_deviation_m
         model = self.p.position_errors, self._is_geometric

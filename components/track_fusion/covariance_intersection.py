@@ -170,11 +170,11 @@ class CovarianceIntersection(Component):
         )
 
     def offer(self, port: str) -> Any:
-        """Hand on what the sensors say of themselves, by name."""
+        """Return the sensors' declarations by name."""
         return sensor_offers(self.context.producers)
 
     def run(self, wake: Wake) -> StateTracks | None:
-        """Take in what the trackers report, instant by instant, and report the fused tracks."""
+        """Process the trackers' reports in order of time, and return the fused tracks."""
         came = {new.source: self._fresh(new, wake) for new in wake.arrivals("tracks")}
         row_of = {name: last_of_run(wake.instants, new.instants) for name, new in came.items()}
         rows = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *row_of.values()]))

@@ -63,9 +63,7 @@ class LastingErrors:
 
     @cached_property
     def is_correlated(self) -> BoolArray:
-        """Whether any error of each sensor is correlated; the last one, of no sensor (-1), is
-        False.
-        """
+        """Return whether any error of each sensor is correlated; False for no sensor (-1)."""
         parts = (self.variance != 0.0) | (self.across_m2 != 0.0) | (self.share != 0.0)
         return np.append((self.step != 0.0).any(axis=0) | parts.any(axis=(0, 1)), False)
 
@@ -250,7 +248,7 @@ class TrackerParameters(Parameters):
         return self
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to an association, a rule or a lateness that is not chosen."""
+        """Return a sentence for each key of an association, rule or lateness that is not chosen."""
         said = super().without_effect()
         if self.association != "jpda":
             because = f"association is '{self.association}'"
@@ -322,7 +320,7 @@ class TrackerRules:
 
     @property
     def lives_ticks(self) -> int:
-        """How long a track lives whose sensors report at every look."""
+        """Return how long a track lives without detections if its sensors report every look."""
         return int(LIVES_S * self.ticks_per_s)
 
     def life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:

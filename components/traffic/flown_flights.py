@@ -195,12 +195,12 @@ class FlownFlights:
 
     @property
     def width(self) -> int:
-        """How many targets each run has."""
+        """Return the number of targets of a run."""
         return len(self.targets) // self.runs
 
     @cached_property
     def place_of_target(self) -> IntArray:
-        """The place among platforms of each target of a run, 0 of none."""
+        """Return the index among platforms of each target of a run, 0 for no platform."""
         places = np.zeros(self.width, dtype=np.int64)
         places[list(self.platforms[1:])] = np.arange(1, len(self.platforms))
         return places
@@ -226,7 +226,7 @@ class FlownFlights:
 
     @property
     def manoeuvre_count(self) -> int:
-        """How many manoeuvres came so far, in all runs."""
+        """Return the number of manoeuvres so far, in all runs."""
         return int(self.fleet.manoeuvre_count.sum())
 
     @cached_property

@@ -143,7 +143,7 @@ class LookoutParameters(SensorParameters):
         return replace(reach, azimuth_rad=both)
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to another search, or to a range that nobody judges."""
+        """Return a sentence for each key of a search or a range estimate that is not chosen."""
         said = super().without_effect()
         other = "round_s" if self.search == "random" else "beta_per_sr_s"
         said += self.idle(other, because=f"search is '{self.search}'")
@@ -251,7 +251,7 @@ class Lookout(Sensor):
             self.reach = replace(self.reach, range_max_m=nearer_m)
 
     def request(self, port: str) -> Any:
-        """Ask for the flights too: aircraft may be acquired between scans."""
+        """Return a request for targets with flights: aircraft may be acquired between scans."""
         reach = super().request(port)
         along = self.p.enabled and self.p.between_scans == "integral"
         return replace(reach, lasts_s=self._period_s) if along else reach

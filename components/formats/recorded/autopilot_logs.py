@@ -200,7 +200,7 @@ class _Frame(NamedTuple):
 
 
 def is_tlog(data: bytes) -> bool:
-    """Tell whether some content begins with two frames of MAVLink, each with a time before it."""
+    """Return whether data begins with two MAVLink frames, each after a time."""
     end = _end_of_frame(data, 0)
     return end is not None and (end == len(data) or _end_of_frame(data, end) is not None)
 
@@ -241,7 +241,7 @@ def tlog_log(problems: Problems, data: bytes, stem: str) -> Log:
 
 
 def _frames(data: bytes, lost: list[int]) -> Iterator[tuple[int, _Frame]]:
-    """Give the whole frames that are wanted, numbered; where one is damaged the next is sought."""
+    """Yield the wanted complete frames with their numbers, skipping damaged ones."""
     at, number = 0, 0
     while at < len(data):
         end = _end_of_frame(data, at)

@@ -28,7 +28,7 @@ class Packet(NamedTuple):
 
 
 def is_capture(data: bytes) -> bool:
-    """Tell whether some content is a capture."""
+    """Return whether data is a packet capture."""
     return data[:4] in _PCAP or data[:4] == _PCAPNG
 
 

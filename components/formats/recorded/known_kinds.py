@@ -153,7 +153,7 @@ def _unzip(problems: Problems, data: bytes) -> bytes:
 
 
 def _is_asterix(data: bytes) -> bool:
-    """Tell whether some content is data blocks of ASTERIX from its first byte to its last."""
+    """Return whether data consists of ASTERIX data blocks from its first byte to its last."""
     at = 0
     while at < len(data):
         size = int.from_bytes(data[at + 1 : at + 3], "big")
@@ -214,7 +214,7 @@ def _of_capture(
 
 
 def _is_daa(text: str) -> bool:
-    """Tell whether a table has a row of units, or offsets from a point, as those of DAIDALUS."""
+    """Return whether a table has a row of units or local offsets, as DAIDALUS's do."""
     lines = (one for one in each_line(text) if not one[1].startswith("#"))
     names = [token.lower() for token in tokens(next(lines, (0, ""))[1])]
     units = tokens(next(lines, (0, ""))[1])

@@ -71,9 +71,7 @@ _CHUNK = 2**16
 def _elements(
     problems: Problems, data: bytes, begins: Collection[str], ends: Collection[str]
 ) -> Iterator[tuple[str, dict[str, str] | None, str, tuple[str, ...]]]:
-    """Give name, attributes, text and parents of some elements; no text at begins, nor attributes
-    at ends.
-    """
+    """Yield name, attributes, text and parents of XML elements, at their begins or ends."""
     events: list[tuple[str, dict[str, str] | None, str, tuple[str, ...]]] = []
     inside: list[str] = []
     text: list[str] = []
@@ -127,7 +125,7 @@ def _of_gpx(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
 
 
 def _of_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -> Iterator[_Point]:
-    """Give the points of tracks, and those of placemarks with a time each."""
+    """Yield the points of tracks, and those of placemarks with a time each."""
     names: dict[int, str] = {}
     tracks: dict[str, int] = {}
     whens, coords, odd = array("d"), array("d"), dict[int, str | None]()
