@@ -267,7 +267,7 @@ def _raw_value(record: AsterixRecord, name: str, field: _Field, value: Any) -> A
 
 
 def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str]]:
-    """Return the records of the categories that we know, in the order of the file, and notes.
+    """Return the records of the categories that we know, each once, in order, and notes.
 
     TrafficFileError says at which byte what is no data block or no record begins.
     """
@@ -275,14 +275,15 @@ def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str
     records: list[AsterixRecord] = []
     left_out: dict[int, int] = {}
     now_s = math.nan
-    timeless = 0
+    timeless, again = 0, 0
+    seen: set[tuple[int, float, bytes]] = set()  # what is sent on two addresses comes twice
     for at, category, raw in _blocks(path, data):
         if category not in cats:
             left_out[category] = left_out.get(category, 0) + 1
             continue
         here = 0
         while here < len(raw):
-            values: dict[str, Any] = {}
+            values, begin = dict[str, Any](), here
             try:
                 here = readers[category](raw, here, values)
                 if here > len(raw):
@@ -299,6 +300,10 @@ def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str
             if now_s == now_s:  # the day on which it is nearest to the record before
                 time_s += DAY_S * round((now_s - time_s) / DAY_S)
             now_s = time_s
+            if (key := (category, time_s, raw[begin:here])) in seen:
+                again += 1
+                continue
+            seen.add(key)
             records.append(AsterixRecord(category, time_s, values))
     notes = [
         f"{count} data blocks of category {category:03d} were left out"
@@ -306,6 +311,8 @@ def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str
     ]
     if timeless:
         notes.append(f"{timeless} records without a time of day were left out")
+    if again:
+        notes.append(f"{again} records stand there again and count once")
     return records, notes
 
 
