@@ -68,7 +68,7 @@ class TurnOutParameters(ConfParameters):
     )
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to manoeuvres that are not chosen."""
+        """Return a sentence for each key of a manoeuvre that is not chosen."""
         used = {"turn": "beyond_deg", "climb": "beyond_m"}.get(self.manoeuvre, "beyond_mps")
         keys = {"beyond_deg", "beyond_m", "beyond_mps"} - {used}
         because = f"manoeuvre is '{self.manoeuvre}'"
@@ -138,7 +138,7 @@ class TurnOut(Component):
         return [Manoeuvres] if self.p.address is None else [*super().records()]
 
     def offer(self, port: str) -> int | None:
-        """Say which address it has."""
+        """Return the address of this aircraft, for coordination with the others."""
         return self.p.address
 
     def undone(self) -> dict[str, IntArray]:
@@ -146,7 +146,7 @@ class TurnOut(Component):
         return {"no change leads clear and the ownship is left alone": self._stuck}
 
     def warnings(self) -> list[str]:
-        """Say why it never steers, where that is so."""
+        """Return a warning where the block can never steer, with the reason."""
         return explain_no_steering(
             self.p.level, self._configuration, self._alerter, self.context.producers
         )
@@ -197,7 +197,7 @@ class TurnOut(Component):
         return {port: message for port, message in messages.items() if message is not None}
 
     def _take_choices(self, wake: Wake) -> None:
-        """Take in the latest choice of each other aircraft."""
+        """Store the latest manoeuvre choice of each other aircraft."""
         since = int(wake.ticks.min()) - int(self.p.heeds_s * self.context.ticks_per_s)
         for new in wake.arrivals("told") if self.p.address is not None else ():
             sides = new.message
@@ -206,7 +206,7 @@ class TurnOut(Component):
                 known = [old for old in self._heard.get(run, ()) if old[0] > since]
                 self._heard[run] = (*known, (one[0], one[1], one[2]))
 
-    def _other_choices(self, run: int, tick: int) -> list[tuple[int, int]]:
+    def _find_valid_choices(self, run: int, tick: int) -> list[tuple[int, int]]:
         """Return address and side of every other aircraft whose choice is valid at an instant.
 
         The lowest address first; windows may know more than has come by then.
@@ -228,13 +228,15 @@ class TurnOut(Component):
         return side
 
     def _is_free(self, run: int, tick: int) -> bool:
-        """Whether its last manoeuvre was long enough ago."""
+        """Return whether the last manoeuvre is long enough ago to begin another."""
         return tick >= self._free_from.get(run, 0)
 
     def _must_give_way(self, run: int, tick: int) -> bool:
-        """Whether a lower address has chosen what does not go with its own choice."""
+        """Return whether an aircraft of lower address has chosen a manoeuvre that conflicts."""
         mine = self._repeated_side(run, tick) if self.p.address is not None else 0
-        first = [side for a, side in self._other_choices(run, tick) if a < (self.p.address or 0)]
+        first = [
+            side for a, side in self._find_valid_choices(run, tick) if a < (self.p.address or 0)
+        ]
         return bool(mine and first and self._matching_side(first[0]) != mine)
 
     def _choose(self, run: int, tick: int, changes: tuple[float, float]) -> float | None:
@@ -243,7 +245,7 @@ class TurnOut(Component):
 
         Without a way there it is free, but not before its time.
         """
-        others = self._other_choices(run, tick) if self.p.address is not None else []
+        others = self._find_valid_choices(run, tick) if self.p.address is not None else []
         if others:
             (address, side), mine = others[0], self._repeated_side(run, tick)
             # Only a lower address changes what was chosen in this conflict.
@@ -312,7 +314,7 @@ class TurnAwayParameters(Parameters):
     )
 
     def without_effect(self) -> list[str]:
-        """Say that a bank leaves no rate to choose."""
+        """Return a sentence if a turn rate is given beside a bank, which determines it."""
         said = super().without_effect()
         if self.bank_deg is None:
             return said

@@ -33,7 +33,7 @@ class Gate(Component):
     )  # fmt: skip
 
     def request(self, port: str) -> FarthestLook:
-        """Ask for the targets that some sensor may look at."""
+        """Return a request for the targets that some sensor may look at."""
         return farthest_look(consumer.request for consumer in self.context.consumers)
 
     def offer(self, port: str) -> Any:

@@ -257,7 +257,7 @@ class Roster:
 
     @cached_property
     def equipage(self) -> Equipage:
-        """What all aircraft carry for others to know them by, then what they do later."""
+        """Return what surveillance equipment each aircraft carries, and how that changes later."""
         every = [*self.aircraft, *(one for _, then in self.later for one in then.aircraft)]
         return Equipage.from_aircraft(every, np.tile(self.keys, len(every) // max(1, len(self))))
 
@@ -270,7 +270,7 @@ class Roster:
 
     @cached_property
     def ever_broadcasts(self) -> BoolArray:
-        """Which aircraft send ADS-B at some time, shape (targets,)."""
+        """Return whether each aircraft sends ADS-B at any time of the run, shape (targets,)."""
         return np.asarray(self.equipage.ads_b.reshape(1 + len(self.later), -1).any(axis=0))
 
     @cached_property
@@ -285,12 +285,12 @@ class Roster:
 
     @cached_property
     def swerling_models(self) -> tuple[int, ...]:
-        """Which models there are, ascending, 5 written as 0."""
+        """Return the numbers of the Swerling models that occur, ascending; 5 is written as 0."""
         return tuple(sorted({craft.swerling % 5 for craft in self.aircraft}))
 
     @property
     def is_shared(self) -> bool:
-        """Whether all replicas have the same aircraft."""
+        """Return whether all replicas have the same aircraft."""
         return len(self.aircraft) == len(self.names)
 
     def craft(self, target: IntArray, replica: IntArray) -> IntArray:
@@ -347,10 +347,10 @@ def joint_roster(
     if len(aircraft) % width:
         return None
     alike = [
-        _fit(one, (first.names[number % width], first.aircraft[number % width]))
+        _is_same_aircraft(one, (first.names[number % width], first.aircraft[number % width]))
         for number, one in enumerate(aircraft)
     ]
-    alike += [_fit(one, (first.own_name, first.own_aircraft[0])) for one in own]
+    alike += [_is_same_aircraft(one, (first.own_name, first.own_aircraft[0])) for one in own]
     if None in alike:
         return None
     if all(alike):
@@ -359,7 +359,7 @@ def joint_roster(
     return Roster(first.names, tuple(craft for _, craft in aircraft), first.own_name, mine)
 
 
-def _fit(one: tuple[str, Aircraft], other: tuple[str, Aircraft]) -> bool | None:
+def _is_same_aircraft(one: tuple[str, Aircraft], other: tuple[str, Aircraft]) -> bool | None:
     """Return whether an aircraft is the same as another's, None where no roster holds both."""
     if one[0] != other[0]:
         return None

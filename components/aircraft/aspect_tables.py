@@ -267,7 +267,7 @@ def _read_nodes(
 
 
 def _rows(path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
-    """Give the rows of a table that hold something but comments (#), with their lines from 1.
+    """Yield the rows of a table that hold something but comments (#), with their lines from 1.
 
     A cell never spans lines, so that a stray quote cannot swallow what follows it.
     """

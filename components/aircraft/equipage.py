@@ -168,7 +168,7 @@ class Equipage:
 
     @property
     def late_s(self) -> FloatArray:
-        """How late positions are that are sent, by what of their latency is not compensated, s."""
+        """Return by how many seconds sent positions are late: their latency not compensated."""
         return self.latency_s - self.compensated_s
 
     @classmethod

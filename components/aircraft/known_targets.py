@@ -39,7 +39,7 @@ class KnownTraffic:
 
     @property
     def was_asked(self) -> bool:
-        """Whether a block went by where the targets can be."""
+        """Return whether a block has used where the targets can be."""
         return self._asked or any(view.was_asked for view in self._views.values())
 
     def envelope(self, reach_m: float, lasts_s: float) -> Any:

@@ -254,7 +254,7 @@ class AlerterKeys:
         return [name for name in found if name.lower() + "_" != prefix]
 
     def _note_idle_detectors(self, name: str, prefix: str) -> None:
-        """Say which detectors of an alerter no level names; not where one is misspelt."""
+        """Add a note on each detector that no level uses, unless its name is misspelt."""
         start = prefix + _CLASS
         for key in sorted(self._lines.keys() - self._used):
             if not key.startswith(start):
@@ -270,7 +270,7 @@ class AlerterKeys:
                 )
 
     def _note_unknown(self) -> None:
-        """Say which keys are unknown: those like a known one each by itself, others together."""
+        """Add a note on unknown keys: one for each that is like a known key, one for all others."""
         strange = []
         for key in sorted(self._lines.keys() - self._used, key=lambda key: self._lines[key][0]):
             number, name, _ = self._lines[key]

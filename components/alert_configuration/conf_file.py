@@ -131,7 +131,7 @@ def _values(lines: Lines, problems: Problems) -> tuple[dict[str, Any], dict[str,
 
 
 def _check_together(values: dict[str, Any], lines: Lines, problems: Problems) -> None:
-    """Note values that do not fit each other."""
+    """Add a problem for each pair of values that contradict each other."""
 
     def at(key: str) -> int | None:
         return lines[key][0] if key in lines else None

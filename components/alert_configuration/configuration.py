@@ -60,7 +60,7 @@ class Configuration:
         return self.values[key]
 
     def notes(self) -> list[str]:
-        """Say what of its file it does not use, or uses otherwise."""
+        """Return a sentence for each setting of the file that is ignored or read differently."""
         said = []
         if self.left_out:
             shown = shorten(", ".join(self.left_out))

@@ -37,7 +37,7 @@ class TableKeys:
         self._sizes: list[tuple[str, str, int, float]] = []
 
     def read_key(self, key: str, shown: str, text: str) -> bool:
-        """Take a key and its value, if it is one of a table; `BadValue` if the value is none."""
+        """Store the value of a table's key and return True, False for other keys; or `BadValue`."""
         match = _KEY.fullmatch(key)
         if match is None:
             return False

@@ -118,7 +118,7 @@ def _fill(axes: Any, corners: list[Any], colour: str, label: str) -> None:
 
 
 def _put_legend_above(axes: Any) -> None:
-    """Put the legend above the axes, at the right: it covers nothing that is drawn."""
+    """Draw the legend above the axes, at the right, where it covers no curve."""
     handles, _ = axes.get_legend_handles_labels()
     if handles:
         axes.legend(

@@ -61,7 +61,7 @@ class EstimatedFlights:
         )
 
     def add(self, came: RunTicks, tracks: StateTracks) -> None:
-        """Take in tracks of a tracker, and when each row came."""
+        """Store the tracks of a tracker, and when each row came."""
         good = np.isin(tracks.track_status, (CONFIRMED, COASTED))
         run = came.run[row_of_entries(tracks.offsets)]
         self.rangeless = with_cases(self.rangeless, run[good & ~tracks.has_range], run[good])
@@ -200,11 +200,11 @@ class BelievedTracks:
         return count_not_judged(self._estimates.rangeless, self._unmoving)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
-        """Take in the tracks of a tracker."""
+        """Store the tracks of a tracker."""
         self._estimates.add(arrived.instants, arrived.message)
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
-        """Take in where the targets are (rows, targets, 3)."""
+        """Store true target positions (rows, targets, 3), and when each message came."""
         self._true = self._true.append(came, position_m=np.moveaxis(position_m, 0, -1))
 
     def flights(
@@ -246,11 +246,11 @@ class BelievedTracks:
 
     def forget(self, asked: RunTicks, times_s: FloatArray, wake: Wake) -> None:
         """Drop what later ones have replaced at some scans."""
-        self._estimates.keep(_asked_later(self._estimates.arrival_ticks, asked, wake))
-        self._true = self._true.take(_asked_later(self._true.instants, asked, wake))
+        self._estimates.keep(_is_needed_later(self._estimates.arrival_ticks, asked, wake))
+        self._true = self._true.take(_is_needed_later(self._true.instants, asked, wake))
 
 
-def _asked_later(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
+def _is_needed_later(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
     """Return which rows later scans may still need: the last one before each of them, and later
     ones.
     """

@@ -103,7 +103,7 @@ class DaidalusAlerting(Component):
     )  # fmt: skip
 
     def request(self, port: str) -> Any:
-        """Ask for no poses beside what is fused: the ownship's own come with the states."""
+        """Return a request for no poses on the fused input: own poses come with the states."""
         return WITHOUT_POSE if port == "fused" else None
 
     def setup(self) -> None:
@@ -129,11 +129,11 @@ class DaidalusAlerting(Component):
         self._memory = LevelMemory(memory_rule(configuration))
 
     def offer(self, port: str) -> AlertsOffered:
-        """Say how many levels there are, and how far apart the scans."""
+        """Return the number of alert levels and the interval between scans, for consumers."""
         return AlertsOffered(len(self.p.read()[1].levels), float(1 / self.p.scan_rate_hz))
 
     def warnings(self) -> list[str]:
-        """Say what of its configuration is not used, and what leaves it without work."""
+        """Return warnings on ignored configuration keys, and on input that cannot cause alerts."""
         said, period_s = self._configuration.notes(), float(1 / self.p.scan_rate_hz)
         if 0.0 < self._configuration["hysteresis_time"] < period_s:
             said.append(
@@ -155,7 +155,7 @@ class DaidalusAlerting(Component):
         return {} if self._roster is None else self._belief.undone()
 
     def run(self, wake: Wake) -> AlertLevels | None:
-        """Take in what came, and give the levels at each scan."""
+        """Store the messages of this wake-up, and return the alert levels of each scan due."""
         for arrived in wake.arrivals("states"):
             self._take_states(arrived, wake)
         if self._roster is None:

@@ -56,7 +56,7 @@ class MOfNAlerts(Component):
         return next((p.offer for p in self.context.producers), None)
 
     def warnings(self) -> list[str]:
-        """Say where its memory cannot hold anything."""
+        """Return a warning where the m-of-n memory is too short to hold any level."""
         offered = self.offer("alerts")
         if offered is None or self.p.forget_s >= offered.period_s:
             return []

@@ -123,7 +123,7 @@ class LevelMemory:
         early: BoolArray,
         present: BoolArray | None = None,
     ) -> IntArray:
-        """Take in targets (n,) at some instants, in order within a run, and return their levels.
+        """Return and remember the levels of targets (n,) at instants of a run, given in order.
 
         `due` and `early` (n, levels) are as for `AlertMemory.step`; all are present by default.
         """

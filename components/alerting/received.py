@@ -52,7 +52,7 @@ class OwnPoses:
         return RunTicks(self._poses.replica, self._poses.tick)
 
     def add(self, came: RunTicks, states: TrafficStates) -> None:
-        """Take in poses, and when they came."""
+        """Store poses of the ownship, and when each came."""
         position = np.radians(states.own_lat_deg), np.radians(states.own_lon_deg), states.own_alt_m
         angles = states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad
         self._keep(

@@ -101,7 +101,7 @@ def broadcast_flat(**arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArr
 
 
 def unflatten(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:
-    """Give a flat result its shape back; a 0-d result becomes a NumPy scalar."""
+    """Return a flat result in a shape; a 0-d result becomes a NumPy scalar."""
     return flat.reshape(shape)[()]
 
 
@@ -231,7 +231,7 @@ def squarable(name: str, value: ArrayLike) -> FloatArray:
 
 
 def broadcast_results(shape: tuple[int, ...], *arrays: FloatArray) -> tuple[FloatArray, ...]:
-    """Give every result the broadcast shape, its own memory, and a scalar for shape ()."""
+    """Return every result broadcast to one shape in its own memory, as a scalar for shape ()."""
     results = []
     for array in arrays:
         if array.shape != shape:

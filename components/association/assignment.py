@@ -75,7 +75,7 @@ def groups(label: IntArray) -> list[IntArray]:
 
 
 def nearest(track: IntArray, detection: IntArray, distance: FloatArray) -> IntArray:
-    """Take the nearest pair, then the nearest of what is left, and so on."""
+    """Return pairs by repeatedly taking the nearest track and detection that are left."""
     taken = [np.flatnonzero(alone(track, detection))]
     left = np.flatnonzero(~alone(track, detection))
     left = left[np.argsort(distance[left], kind="stable")]
@@ -94,7 +94,7 @@ def nearest(track: IntArray, detection: IntArray, distance: FloatArray) -> IntAr
 def global_nearest(
     track: IntArray, detection: IntArray, distance: FloatArray, missing: FloatArray | float
 ) -> IntArray:
-    """Take the pairs whose sum of distances, with a price for tracks left out, is the least."""
+    """Return the pairs with the least sum of distances plus a price for each track left out."""
     single = alone(track, detection)
     taken = [np.flatnonzero(single)]
     left = np.flatnonzero(~single)

@@ -37,7 +37,7 @@ class CameraSights:
         self.states: TrafficStates | None = None
 
     def take(self, block: str, message: Detections, ticks_per_s: int) -> None:
-        """Take in what a camera detected."""
+        """Store the detections of a camera."""
         if block not in self._cameras or "pixels" not in message.extras:
             return
         self._roster, self._ticks_per_s = message.roster, ticks_per_s

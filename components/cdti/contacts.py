@@ -46,7 +46,7 @@ class OwnFlight:
         self._pose: FloatArray = np.empty((0, 6))
 
     def take(self, states: TrafficStates, ticks_per_s: int) -> None:
-        """Take in new positions."""
+        """Store new positions of the ownship."""
         new = np.stack([
             states.own_lat_deg, states.own_lon_deg, states.own_alt_m, states.own_yaw_rad,
             states.own_pitch_rad, states.own_roll_rad,

@@ -72,7 +72,7 @@ class LivePacer(Pacer):
         self._changed.set()
 
     def start(self) -> None:
-        """Let simulated time 0 be when nothing holds the run any more."""
+        """Set the wall-clock time of simulated time 0 to now, once nothing holds the run."""
         self._wait_while_held()
         super().start()
 
@@ -160,7 +160,7 @@ class SessionControl:
         return self._pauses and self._operators == 0
 
     def show_time(self, time_s: float, lag_s: float) -> None:
-        """Note the simulated time that the run has reached, and show it."""
+        """Store the simulated time that the run has reached, and show it on the pages."""
         self._now = time_s, lag_s, None if self.scope is None else self.scope.take_received()
         if self._gone_at is not None:
             self.holds()
@@ -201,7 +201,7 @@ class SessionControl:
     # -- the thread of the server ------------------------------------------------------------------
 
     def on_operators(self, count: int) -> None:
-        """Take note of how many pages are there that may decide."""
+        """Store how many connected pages may decide."""
         if self._operators and not count:
             self._gone_at = time.monotonic()
         elif count:
@@ -249,7 +249,7 @@ class SessionControl:
         return content
 
     async def on_message(self, page: "Page", message: PageMessage) -> None:
-        """Take in a message of a page."""
+        """Process a message from a page."""
         if isinstance(message, Chosen):
             page.chosen = message.target
             self._server.announce_picture()

@@ -123,7 +123,7 @@ class Scope:
     # -- the thread of the simulation ------------------------------------------------------------
 
     def listen(self, block: str, message: Message) -> None:
-        """Take in what a block has sent."""
+        """Store a message that a block has sent."""
         if len(message) == 0 or block not in self._on_board:
             return
         if isinstance(message, TrafficStates):
@@ -144,7 +144,7 @@ class Scope:
             self._take_contacts(message)
 
     def _take_reports(self, message: Detections) -> None:
-        """Take in what aircraft say of themselves, if they do."""
+        """Store the aircraft's own position reports, if the message has any."""
         if "reported_alt_m" not in message.extras:
             return
         altitude, climb = (message.extras[f"reported_{name}"] for name in ("alt_m", "climb_m_s"))

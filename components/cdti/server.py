@@ -54,7 +54,7 @@ class Page:
         self._free.set()
 
     def note_drawn(self, frame: int) -> None:
-        """Take note that a picture is on screen."""
+        """Record that a page has drawn a picture."""
         self._drawn = max(self._drawn, min(frame, self._sent))
         if self._sent - self._drawn < _AHEAD:
             self._free.set()
@@ -77,7 +77,7 @@ class Page:
 
 
 class PageControl(Protocol):
-    """What a server asks of whoever runs the session; called in the server's thread."""
+    """Callbacks of `DisplayServer` to the session: messages to send, and page events."""
 
     def welcome(self, role: str) -> dict[str, Any]:
         """Return the first message to a new page."""
@@ -86,10 +86,10 @@ class PageControl(Protocol):
         """Return the newest picture, or None before the first."""
 
     async def on_message(self, page: Page, message: PageMessage) -> None:
-        """Take in a message of a page."""
+        """Process a message from a page."""
 
     def on_operators(self, count: int) -> None:
-        """Take note of how many pages are there that may decide."""
+        """Store how many connected pages may decide."""
 
 
 class DisplayServer:
@@ -125,15 +125,15 @@ class DisplayServer:
         return f"http://{self.authority}/?token={token}"
 
     def announce_picture(self) -> None:
-        """Let every page have a new picture when it can take one."""
+        """Wake every page, so that each sends the new picture when its client is ready."""
         self._call_from_outside(self._announce)
 
     def tell(self, content: dict[str, Any]) -> None:
-        """Tell every page."""
+        """Send a message to every page."""
         self._call_from_outside(lambda: self._send_to_all(content))
 
     def close(self, last: dict[str, Any]) -> None:
-        """Say a last word to every page and end."""
+        """Send a last message to every page and stop the server."""
         if not self._thread.is_alive():
             return
 
@@ -169,7 +169,7 @@ class DisplayServer:
         self.loop.set_exception_handler(limit.on_error)
         try:
             server = await serve(
-                self._meet,
+                self._serve_page,
                 self._host,
                 self._port,
                 process_request=self._answer,
@@ -177,7 +177,7 @@ class DisplayServer:
                 compression=None,
                 server_header=None,
                 logger=quiet,
-                create_connection=cast(type[ServerConnection], limit.connection),
+                create_connection=cast(type[ServerConnection], limit.make_connection),
                 ping_interval=10,
                 ping_timeout=20,
                 close_timeout=1,
@@ -215,7 +215,7 @@ class DisplayServer:
             return connection.respond(503, "too many browsers\n")
         return None
 
-    async def _meet(self, connection: ServerConnection) -> None:
+    async def _serve_page(self, connection: ServerConnection) -> None:
         """Live with one page until it goes."""
         assert connection.request is not None
         query = parse_qs(urlsplit(connection.request.path).query)
@@ -294,7 +294,7 @@ class ConnectionLimit:
         self._open = 0
         self._said = self._starved = False
 
-    def connection(self, *given: Any, **options: Any) -> ServerConnection:
+    def make_connection(self, *given: Any, **options: Any) -> ServerConnection:
         """Return what `websockets.asyncio.server.serve` makes of a new connection."""
         return _Limited(self, *given, **options)
 
@@ -336,7 +336,7 @@ class _Limited(ServerConnection):
         self._limit, self._taken = limit, False
 
     def connection_made(self, transport: Any) -> None:
-        """Take it, or drop it."""
+        """Accept a connection, or drop it where too many are open."""
         self._taken = self._limit.count_opened()
         if self._taken:
             super().connection_made(transport)
@@ -344,7 +344,7 @@ class _Limited(ServerConnection):
             transport.abort()
 
     def connection_lost(self, error: Exception | None) -> None:
-        """Give its place back."""
+        """Release the place of a closed connection."""
         if self._taken:
             self._taken = False
             self._limit.count_closed()

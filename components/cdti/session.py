@@ -150,7 +150,7 @@ def _check_host(host: str) -> None:
 
 @contextmanager
 def _stopping(pacer: LivePacer, received: list[int]) -> Iterator[None]:
-    """Let ctrl-C and SIGTERM end the run at its next instant; a second one breaks it off."""
+    """Make ctrl-C and SIGTERM end the run at its next instant; a second signal aborts it."""
 
     def handle(number: int, frame: FrameType | None) -> None:
         if received:

@@ -104,7 +104,7 @@ class Flights:
 
     @property
     def own_name(self) -> str:
-        """What other platforms call the ownship."""
+        """Return the name that other platforms give the ownship."""
         return self._source.roster.own_name
 
     def ownship_position_at(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -61,7 +61,7 @@ class TrackSummary:
         }
 
     def update(self, table: str, columns: Columns) -> None:
-        """Take rows of ``state_tracks``."""
+        """Update the summary with rows of ``state_tracks``."""
         confirmed = is_held(columns["track_status"])
         for name, rows in rows_by_name(columns["block"]):
             self._entries[name].add(columns, rows[confirmed[rows]])
@@ -90,7 +90,7 @@ class AlertSummary:
         self._entries: dict[str, dict[int, dict[str, list[float]]]] = {n: {} for n in sources}
 
     def update(self, table: str, columns: Columns) -> None:
-        """Take rows of ``alerts``, in order of time."""
+        """Update the summary with rows of ``alerts``, in order of time."""
         level, time_s, target = columns["level"], columns["time_s"], columns["target"]
         for name, rows in rows_by_name(columns["block"]):
             rows = rows[level[rows] > 0]
@@ -143,7 +143,7 @@ class ManoeuvreSummary:
         }
 
     def update(self, table: str, columns: Columns) -> None:
-        """Take rows of ``manoeuvres``, in order of time."""
+        """Update the summary with rows of ``manoeuvres``, in order of time."""
         time_s = columns["time_s"]
         for name, rows in rows_by_name(columns["block"]):
             entry = self._entries[name]
@@ -177,7 +177,7 @@ class PlatformSummary:
         self._simulation = simulation
 
     def update(self, table: str, columns: Any) -> None:
-        """Take no rows."""
+        """Ignore all rows: this summary uses none."""
 
     def result(self) -> dict[str, Any]:
         """Return the section ``platforms``: name → ``blocks``, and of all but the ownship

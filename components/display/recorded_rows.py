@@ -29,7 +29,7 @@ _DETECTIONS = ("block", "target", "time_s", "true_range_m")
 def iterate_row_groups(
     path: Path, columns: Sequence[str], most: float = math.inf
 ) -> Iterator[dict[str, Any]]:
-    """Give columns of each row group that has rows, in order; a table that is not there has none.
+    """Yield columns of each row group that has rows, in order; nothing for a missing table.
 
     They are arrays, texts a `Text`. Of a table of more rows than `most`, groups spread over it.
     """
@@ -66,7 +66,7 @@ def _array(column: Any, text: bool) -> Any:
 
 
 def read_fused(folder: Path) -> Iterator[tuple[FloatArray, IntArray, tuple[str, ...]]]:
-    """Give for each row group of ``fused``, in order: times, codes of combinations, their names."""
+    """Yield times, codes of combinations and their names for each row group of ``fused``."""
     for rows in iterate_row_groups(folder / "fused.parquet", ("time_s", "sensors")):
         yield rows["time_s"], rows["sensors"].codes, rows["sensors"].names
 

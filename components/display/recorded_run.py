@@ -52,12 +52,12 @@ class RecordedTables:
         return {name: str(blocks.get(name, {}).get("type", "")) for name in names}
 
     def has(self, table: str, *names: str) -> bool:
-        """Whether there is a table with some columns."""
+        """Return whether a table is recorded and has columns."""
         return table in self.tables and {*names} <= {*self.table(table).column_names}
 
     @cached_property
     def carrying(self) -> dict[str, str]:
-        """What carries each block, the ownship's blocks first; nothing where one carries all."""
+        """Return the platform of each block, the ownship's first; empty where there is only one."""
         found = {
             (on, block)
             for name, table in self.tables.items()
@@ -75,7 +75,7 @@ class RecordedTables:
 
     @cached_property
     def own_name(self) -> str:
-        """What others call the ownship: who carries blocks or is seen, but is no true target."""
+        """Return the name that other platforms give the ownship, which is no true target."""
         if not self.carrying:
             return OWNSHIP
         seen = {name: None for table in ("detections", "tracks", "alerts")
@@ -99,12 +99,12 @@ class RecordedTables:
         return replace(self, tables=tables, _kept={})
 
     @cached_property
-    def _with_pose(self) -> Any:
+    def _join_pose(self) -> Any:
         return with_columns_of_rows(self.tables, "detections")
 
     def table(self, name: str) -> Any:
         """Return a table; detections have with them where the ownship was at each."""
-        return self._with_pose if name == "detections" else self.tables[name]
+        return self._join_pose if name == "detections" else self.tables[name]
 
     def flights(self) -> dict[str, dict[str, FloatArray]]:
         """Return the true flight of each aircraft by its name, the ownship first.
@@ -145,7 +145,7 @@ class RecordedTables:
         return np.stack([own[name.removeprefix("own_")][at] for name in POSE])
 
     def refuse_large(self, table: str, columns: Mapping[str, FloatArray]) -> None:
-        """Refuse what is no number, or greater than any of a run, by name and row."""
+        """Raise `UsageError` for a value that is NaN or too large, naming column and row."""
         for name, values in columns.items():
             large = ~(np.abs(values) <= _LARGEST)
             if large.any():

@@ -216,14 +216,14 @@ def targets_key(dense: bool) -> Any:
 
 
 def set_time_axis(axes: Any, start_s: float, end_s: float, what: str) -> None:
-    """Give axes a time from start to end, a label of the other axis, and a grid."""
+    """Set an axis of time from start to end, a label for the other axis, and a grid."""
     axes.set_xlim(start_s, max(end_s, start_s + 1e-9))
     axes.set(xlabel="time (s)", ylabel=what)
     add_grid(axes)
 
 
 def add_grid(axes: Any) -> None:
-    """Give axes a grid behind what is drawn."""
+    """Draw a grid behind the curves."""
     axes.grid(color="#DDDDDD", linewidth=0.5)
     axes.set_axisbelow(True)
 

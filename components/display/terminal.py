@@ -114,7 +114,7 @@ _WHY_NOT_SEEN = {
 
 
 def cut_off_lines(sensors: dict[str, Any]) -> list[str]:
-    """Say what the asterisk means behind the first and last detections that the run cut off."""
+    """Return a line on the asterisk beside detections that the run's begin or end cut off."""
     ends = {
         f"{which} at {seen['at']}"
         for entry in sensors.values()
@@ -125,7 +125,7 @@ def cut_off_lines(sensors: dict[str, Any]) -> list[str]:
 
 
 def unseen_lines(sensors: dict[str, Any]) -> list[str]:
-    """Say of each sensor without a detection why it saw nothing."""
+    """Return a line for each sensor without a detection: why it saw nothing."""
     lines = []
     for name, entry in sensors.items():
         if entry["first_detection"] is not None:
@@ -150,7 +150,7 @@ def unseen_lines(sensors: dict[str, Any]) -> list[str]:
 
 
 def outcome_lines(summary: dict[str, Any]) -> list[str]:
-    """Say what came of tracks, alerts and manoeuvres, a line for each block that has any to do."""
+    """Return a line for each block with tracks, alerts or manoeuvres: their numbers."""
     lines = [f"{name}: {_tracks_text(entry)}" for name, entry in summary.get("tracks", {}).items()]
     lines += [
         f"{name}: {entry['left_out']:,} of {entry['looks']:,} looks of {sensor} "
@@ -224,7 +224,7 @@ def _more_text(targets: dict[str, Any]) -> str:
 
 
 def attitude_lines(traffic: dict[str, Any]) -> list[str]:
-    """Say that attitude was derived from flown paths, and how wrong that is."""
+    """Return a line that attitude was derived from flown paths, and how wrong that is."""
     derived = traffic.get("derived_attitude")
     if not derived:
         return []

@@ -59,7 +59,7 @@ class HostTraffic(Component):
         self.roster = Roster.from_pairs([(plane.name, plane) for plane in parameters.planes])
 
     def offer(self, port: str) -> Roster:
-        """Say what the targets are."""
+        """Return the roster of targets, for consumers."""
         return self.roster
 
     def natural_duration_s(self) -> Fraction:

@@ -47,7 +47,7 @@ class Sighting:
 
     @property
     def detected(self) -> bool:
-        """Whether any sensor detected it."""
+        """Return whether any sensor detected it."""
         return bool(self.sensors)
 
     @property

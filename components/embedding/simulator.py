@@ -204,7 +204,7 @@ class Simulator:
         *,
         plane: str | int | None = None,
     ) -> EncounterResult:
-        """Say where the planes are detected at an instant, by which sensors and how surely.
+        """Return where the planes are detected at an instant, by which sensors and how surely.
 
         Parameters
         ----------
@@ -276,7 +276,7 @@ class Simulator:
         return fusions[0]
 
     def _rehearse(self, chain: HostDriven) -> None:
-        """Let every sensor look at every plane once, from near enough to take it seriously."""
+        """Run every sensor once on every plane at short range, so that later calls are fast."""
         own, count = np.zeros((1, 6)), len(self._planes)
         rows = np.zeros((count, 6))
         rows[:, 0] = 1e-4  # some 600 m ahead

@@ -182,7 +182,7 @@ def convert(**options: Any) -> None:
 @click.option("--skip-damaged", is_flag=True, help="Leave damaged encounters out and count them.")
 @plain_errors
 def show(**options: Any) -> None:
-    """Say what is in a set: weights, and the geometry at the closest approaches.
+    """Print a set's weights, and the geometry at its closest approaches.
 
     FILE is a set, or whatever `convert` reads.
     """

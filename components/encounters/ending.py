@@ -62,7 +62,7 @@ class ClosestApproachPassed(Component):
     rewindable = True
 
     def request(self, port: str) -> FarthestLook:
-        """Ask for all targets, however far they are."""
+        """Return a request for all targets, however far they are."""
         return FarthestLook(np.inf)
 
     def setup(self) -> None:

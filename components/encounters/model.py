@@ -42,7 +42,7 @@ class NetworkNode:
 
     @cached_property
     def empty(self) -> BoolArray:
-        """Whether a column holds no count at all."""
+        """Return whether each column of counts is all zeros."""
         return self.totals == 0.0
 
     @cached_property
@@ -162,7 +162,7 @@ class Bins:
 
     @property
     def width(self) -> FloatArray:
-        """How far the values of each bin reach."""
+        """Return the width of each bin."""
         if self.edges is None:
             return np.zeros(self.size)
         return np.where(self._around_zero, 0.0, np.diff(self.edges))
@@ -196,7 +196,7 @@ class EncounterModel:
 
     @property
     def name(self) -> str:
-        """What the file is called."""
+        """Return the name of the model's file."""
         return self.path.stem
 
     @property

@@ -92,7 +92,7 @@ class PairSampler:
         self._draws = EncounterDraws(seed, "pairs")
 
     def batches(self, numbers: range) -> Iterator[Pairs]:
-        """Give pairs in order of their numbers, `at_start`, in batches that suit the memory."""
+        """Yield pairs in order of their numbers, at their start, in batches that fit in memory."""
         for start in range(0, len(numbers), PAIRS_AT_ONCE):
             yield self.pairs(numbers[start : start + PAIRS_AT_ONCE], paths=False)
 

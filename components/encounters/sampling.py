@@ -91,7 +91,7 @@ class SampledTracks:
     changing: FloatArray
 
     def replace(self, indices: IntArray, others: "SampledTracks", which: BoolArray) -> None:
-        """Put some of other tracks at these indices."""
+        """Replace the tracks at these indices by some of other tracks."""
         self.initial[:, indices] = others.initial[:, which]
         self.initial_bins[:, indices] = others.initial_bins[:, which]
         self.left[:, indices] = others.left[:, which]

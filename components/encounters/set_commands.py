@@ -64,7 +64,7 @@ def convert_sets(
 
 
 def _say_what_was_left_out(encounters: EncounterSet) -> None:
-    """Say what was left out of a set, and what was done to the rows of its files."""
+    """Print what was left out of a set, and what was changed in the rows of its files."""
     if encounters.skipped:
         say(f"{encounters.skipped} damaged encounters were skipped")
     for note in encounters.notes[:_MOST_NOTES]:

@@ -92,7 +92,7 @@ class Weather(Parameters):
     )
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to weather that there is not."""
+        """Return a sentence for each key of weather that is switched off."""
         said = []
         if not self.wind_mps:
             said += self.idle("wind_from_deg", because="wind_mps is 0")
@@ -307,7 +307,7 @@ class Terrain(Parameters):
         return float(heights[0]) + self.raster_zero_m if inside[0] else None
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to ground that there is not, and where ground is made up."""
+        """Return a sentence for each key of ground that is switched off, and on made-up ground."""
         said = []
         if self.raster is None:
             said += self.idle("raster_offset_m", because="raster is not given")

@@ -149,7 +149,7 @@ class ReportedErrors:
 
     @property
     def considered_components(self) -> BoolArray | None:
-        """Which components of a state its reports do not correct, (k, n); None for none.
+        """Return which state components its reports do not correct, (k, n); None for none.
 
         All that an aircraft reports is late alike, so its reports do not tell by how much: only
         the errors of linearising would seem to.

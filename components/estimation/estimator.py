@@ -110,7 +110,7 @@ class Estimator(Protocol):
 
     @property
     def errors(self) -> int:
-        """How many errors of measurements a track's state carries, behind its velocity."""
+        """Return how many measurement errors a track's state carries after its velocity."""
         return 0
 
     @property
@@ -216,7 +216,7 @@ class SingleModelFilter(Estimator):
 
     @property
     def errors(self) -> int:
-        """How many errors its states carry."""
+        """Return how many measurement errors the states carry."""
         return len(self.model.lasts_s) if isinstance(self.model, MotionWithErrors) else 0
 
     def carrying(self, lasts_s: tuple[float, ...]) -> Self:

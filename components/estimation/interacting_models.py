@@ -57,7 +57,7 @@ class InteractingMultipleModels(Estimator):
 
     @property
     def errors(self) -> int:
-        """How many errors the states of every filter carry."""
+        """Return how many measurement errors the states of every filter carry."""
         return self.filters[0].errors
 
     def carrying(self, lasts_s: tuple[float, ...]) -> "InteractingMultipleModels":

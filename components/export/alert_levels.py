@@ -29,16 +29,16 @@ class Alert:
 
     @property
     def track_name(self) -> str | None:
-        """What displays call its track."""
+        """Return the name that displays give the track of the alert."""
         return None if self.track is None else f"track {self.track}"
 
     @property
     def name(self) -> str | None:
-        """What it is about: a target, or else a track."""
+        """Return the name of the target that the alert is about, or else of the track."""
         return self.target or self.track_name
 
     def stretches(self, run_end_s: float) -> Iterator[tuple[float, float, int]]:
-        """Give start, end and level of each stretch of one level."""
+        """Yield start, end and level of each period of constant level."""
         ends = [time_s for time_s, _ in self.levels[1:]]
         ends.append(run_end_s if self.end_s is None else self.end_s)
         for (start_s, level), end_s in zip(self.levels, ends, strict=True):

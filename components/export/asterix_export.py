@@ -61,7 +61,7 @@ def asterix_bytes(run: RecordedTables) -> bytes:
 
 
 def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
-    """Give a north marker with the position of the radar for each of its scans, and its plots."""
+    """Yield a north marker with the position of the radar for each of its scans, and its plots."""
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         return
     lines = run.stack_columns("detections", LINE)
@@ -109,7 +109,7 @@ def _has_reported_position(run: RecordedTables) -> BoolArray:
 
 
 def _received_reports(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
-    """Give what aircraft say of themselves, once for each position that was received.
+    """Yield one record for each position that aircraft reported and that was received.
 
     Heights are pressure altitudes.
     """
@@ -166,7 +166,7 @@ def _track(
 
 
 def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
-    """Give estimated tracks, at the instants for which their states are valid."""
+    """Yield estimated tracks, at the instants for which their states are valid."""
     rows, positions = estimated_positions(run)
     if len(rows) == 0:
         return
@@ -199,7 +199,7 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
 
 
 def _stub_track_records(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
-    """Give what trackers hold of each target, once for each measurement, at its instant."""
+    """Yield a record of a tracker's stub track for each measurement, at its instant."""
     rows, positions = held_positions(run)
     if len(rows) == 0:
         return
@@ -214,7 +214,7 @@ def _stub_track_records(run: RecordedTables, sic: dict[str, int]) -> Iterator[As
 
 
 def _ownship_reports(run: RecordedTables) -> Iterator[AsterixRecord]:
-    """Give the ownship's flight as it would broadcast it."""
+    """Yield the ownship's flight as it would broadcast it."""
     if "truth" not in run.tables:
         return
     own = run.flights().get(run.own_name)

@@ -135,7 +135,7 @@ def _course_of_alert(
 
 
 def seen_positions(run: RecordedTables) -> Iterator[DetectedPlace]:
-    """Give the detections that have a range."""
+    """Yield the detections that have a range."""
     if "detections" not in run.tables:
         return
     names = ("time_s", *LINE, *POSE)
@@ -154,7 +154,7 @@ def seen_positions(run: RecordedTables) -> Iterator[DetectedPlace]:
 
 
 def _estimated_courses(run: RecordedTables) -> Iterator[Course]:
-    """Give tracks that were ever confirmed, until they are deleted."""
+    """Yield tracks that were ever confirmed, until they are deleted."""
     rows, positions = estimated_positions(run)
     if len(rows) == 0:
         return
@@ -183,7 +183,7 @@ def _held_courses(run: RecordedTables) -> Iterator[Course]:
 
 
 def _group_names(names: Sequence[tuple[str, str]]) -> Iterator[tuple[tuple[str, str], IntArray]]:
-    """Give each name and its indices in the sequence, in order of names."""
+    """Yield each name with its indices in the sequence, in order of names."""
     result: dict[tuple[str, str], list[int]] = {}
     for position, name in enumerate(names):
         result.setdefault(name, []).append(position)

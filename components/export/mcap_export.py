@@ -135,7 +135,7 @@ def _column_schema(field: Any) -> dict[str, Any]:
 
 
 def _scene_messages(run: RecordedTables) -> Iterator[_Message]:
-    """Give flights and detections, around where the ownship begins."""
+    """Yield flights and detections, around where the ownship begins."""
     flights = run.flights() if "truth" in run.tables else {}
     origin: tuple[float, ...] | None = None
     for name, flight in flights.items():

@@ -49,7 +49,7 @@ class RecordedDetector(DetectionReader):
 
     @BufferedGenerator.generator_method
     def detections_gen(self) -> Iterator[tuple[datetime, set[Detection]]]:
-        """Give every look of every sensor, in the order of their instants."""
+        """Yield the detections of every look of every sensor, in order of time."""
         yield from self.looks
 
 
@@ -181,7 +181,7 @@ def _origin(run: RecordedTables, pose: FloatArray) -> Origin:
 def _looks(
     run: RecordedTables, columns: Mapping[str, Any], poses: Poses
 ) -> Iterator[tuple[datetime, set[Detection]]]:
-    """Give looks by their instants; those of one instant with ranges first, then by name."""
+    """Yield looks by their instants; those of one instant with ranges first, then by name."""
     block, time_s = columns["block"], columns["time_s"]
     ranged = set(block[np.isfinite(columns["range_m"])])
     result: dict[tuple[float, bool, str], list[int]] = {}

@@ -66,7 +66,7 @@ def fit_path(
 def blocks_of_path(
     time_s: FloatArray,
 ) -> Iterator[tuple[slice, slice, slice, Sequence[int]]]:
-    """Give blocks of a long path, for what is fitted around its samples.
+    """Yield slices that divide a long path into blocks, for fits around its samples.
 
     Each is a block with its neighbours on either side, which rows of that are its own, which these
     are of the path, and the offsets of `fit_path`.
@@ -213,7 +213,7 @@ def _ratio(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
 
 
 def _hold_yaw(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
-    """Give samples without speed the yaw of the last one that moves."""
+    """Return yaws in which samples without speed have that of the last sample that moves."""
     if moving.all():
         return yaw
     index = np.arange(len(yaw)).reshape(len(yaw), *(1 for _ in yaw.shape[1:]))
@@ -237,7 +237,7 @@ class Wind:
 
     @property
     def speed_mps(self) -> float:
-        """How fast the air goes."""
+        """Return the wind's speed."""
         return math.hypot(self.east_mps, self.north_mps)
 
 

@@ -224,7 +224,7 @@ def _slant_ranges(own: Any, other: Any) -> tuple[FloatArray, Any]:
 
 
 def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: FloatArray) -> None:
-    """Note what is nearer than all that was known, or as near and earlier."""
+    """Update the closest approaches where a new range is smaller, or as small and earlier."""
     maybe = range_m <= best.range_m[target]
     target, time_s, range_m = target[maybe], time_s[maybe], range_m[maybe]
     order = np.lexsort((time_s, range_m, target))
@@ -244,7 +244,7 @@ def censored_approaches(
     time_s: FloatArray,
     end_s: float,
 ) -> list[str]:
-    """Say of each closest approach whether it is at an end of what was looked at."""
+    """Return for each closest approach whether it lies at an end of the compared times."""
     present_s = np.array(present_together_s(own, targets.intervals_present_s, end_s))
     looked_s = np.array(_sample_span_s(compared_at, *present_s))
     return [
@@ -254,7 +254,7 @@ def censored_approaches(
 
 
 def end_of_look(time_s: float, looked_s: FloatArray, present_s: FloatArray, end_s: float) -> str:
-    """Say of one closest approach whether it is at an end of what was looked at."""
+    """Return which end of the compared times a closest approach lies at, or an empty string."""
     if time_s <= looked_s[0]:
         return "the start of its flight" if present_s[0] > 0.0 else "the start"
     if time_s >= looked_s[1]:

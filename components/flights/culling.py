@@ -183,7 +183,7 @@ class SteeredCulling:
         )
 
     def forget(self, run: int, time_s: float) -> None:
-        """Take note that the ownship of a run flies otherwise than was known from a time on."""
+        """Discard what is known of a run's ownship after a time, as it steers from then on."""
         known = self._known[0, run]
         known[known * self.epoch_s[run] >= time_s] = -1
 

@@ -273,7 +273,7 @@ class LegBuilder:
     def _add(
         self, kind: Kind, table: FloatArray, duration: float | None, pitch: float, roll: float
     ) -> float | None:
-        """Note a segment and move to its end."""
+        """Append a segment and move the builder to its end."""
         if duration == 0.0:
             return duration
         # A hold's table has its climb in row 3; elsewhere the pitch is that of the path.

@@ -247,7 +247,7 @@ class SampledTrajectory:
         )
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
-        """Give the aircraft's state at some times."""
+        """Return the aircraft's state at some times."""
         times = np.asarray(time_s, dtype=np.float64)
         flat = np.ascontiguousarray(times).reshape(-1)
         segment, elapsed, present = locate(self.sample_times_s, flat)
@@ -291,7 +291,7 @@ class SampledFleet(Fleet):
 
     @cached_property
     def _table(self) -> tuple[FloatArray, IntArray | None]:
-        """What is known of each segment: in a row of the memory, the segments of each together.
+        """Return the coefficients of every segment, a row each, grouped by aircraft.
 
         With it goes how much later those of each are than in order; None for nowhere. A table is
         there once: flights have theirs from there, and so has another fleet of some of them.
@@ -331,7 +331,7 @@ class SampledFleet(Fleet):
         return PieceSearch.from_starts([flight.sample_times_s for flight in self._flights])
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
-        """Give every aircraft's state at some times."""
+        """Return every aircraft's state at some times."""
         times, count = check_times(time_s), len(self)
         state = empty_state(len(times), count)
         rows = max(1, CELLS_AT_ONCE // max(1, count))
@@ -357,7 +357,7 @@ class SampledFleet(Fleet):
         return state
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
+        """Return states of chosen aircraft (n,), each at its own time (n,) in s."""
         return evaluate_in_blocks(self._state, aircraft, time_s)
 
     def _segments(self, index: IntArray, aircraft: IntArray) -> FloatArray:
@@ -412,7 +412,7 @@ def _mean_speed_bound(
 
 
 def _is_velocity_of_path(measured: Vector, time_s: FloatArray, *place: FloatArray) -> bool:
-    """Tell whether velocities are those of the path: median misfit in 5 m/s or 10 % of speed."""
+    """Return whether velocities are those of the path: median misfit in 5 m/s or 10 % of speed."""
     misfit, speed = np.empty(len(time_s)), np.empty(len(time_s))
     for part, inner, rows, offsets in blocks_of_path(time_s):
         fitted, _ = fit_path(time_s[part], *(column[part] for column in place), offsets=offsets)

@@ -87,7 +87,7 @@ def checked_samples(name: str, **columns: npt.ArrayLike | None) -> dict[str, Flo
 
 
 def all_within_limits(columns: Mapping[str, FloatArray]) -> bool:
-    """Tell whether no value of any column, of any shape, is one that `checked_samples` refuses."""
+    """Return whether `checked_samples` refuses no value of any column."""
     return all(bool((np.abs(array) <= _LIMITS[name][0]).all()) for name, array in columns.items())
 
 
@@ -154,7 +154,7 @@ def _tangents(
 def _bent_segments(
     start: tuple[FloatArray, ...], tangents: tuple[FloatArray, ...], duration: FloatArray
 ) -> npt.NDArray[np.bool_]:
-    """Tell which segments' end velocities are plausible beside their mean velocity."""
+    """Return which segments' end velocities are plausible beside their mean velocity."""
     misfit, change = np.zeros_like(duration), np.zeros_like(duration)
     for row, (value, tangent) in enumerate(zip(start, tangents, strict=True)):
         to_metres = 1.0 if row == 3 else SEMI_MAJOR_AXIS_M

@@ -148,7 +148,7 @@ class ScriptedTrajectory:
         return ScriptedFleet([self])
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
-        """Give the aircraft's state at some times."""
+        """Return the aircraft's state at some times."""
         times = np.asarray(time_s, dtype=np.float64)
         return self.as_fleet.at(times.reshape(-1)).reshape(times.shape)
 
@@ -182,7 +182,7 @@ class ScriptedFleet(Growing, Fleet):
         kinds: IntArray,
         tables: dict[int, FloatArray],
     ) -> None:
-        """Take times there (2, flights), numbers of legs, and of legs start, pitch, roll, speed.
+        """Store times (2, flights), numbers of legs, and each leg's start, pitch, roll and speed.
 
         Fixed angles (3, flights) are NaN where the motion gives them; the table of each kind of
         legs holds those of that kind, in their order.
@@ -286,7 +286,7 @@ class ScriptedFleet(Growing, Fleet):
         return self._between_s[:, self._columns].T
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
-        """Give every aircraft's state at some times."""
+        """Return every aircraft's state at some times."""
         times = check_times(time_s)
         groups, others = self._parts
         parts = [(group.columns, group.at(times)) for group in groups]
@@ -304,7 +304,7 @@ class ScriptedFleet(Growing, Fleet):
         return state
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Give single aircraft's states (n,), each at a time (n,) of its own, in s."""
+        """Return states of chosen aircraft (n,), each at its own time (n,) in s."""
         return evaluate_in_blocks(self._state, self._columns[aircraft], time_s)
 
     def _legs_at(self, aircraft: IntArray, time_s: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -61,7 +61,7 @@ class ChildProcess:
 
 
 def describe_exit(code: int) -> str:
-    """Say how a program ended, by its code as `subprocess` has it."""
+    """Return in words how a program ended, from its exit code as `subprocess` gives it."""
     if code < 0:
         return f"died of signal {-code} ({signal.Signals(-code).name})"
     return f"ended with exit code {code}"

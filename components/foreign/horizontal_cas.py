@@ -61,7 +61,7 @@ class HorizontalCas(Component):
         self._advisory = 0
 
     def run(self, wake: Wake) -> Manoeuvres | None:
-        """Ask the network that is due, and turn for one step."""
+        """Evaluate the network that is due, and return a turn for one step."""
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None

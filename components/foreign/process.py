@@ -103,7 +103,7 @@ class ProcessParameters(Parameters):
         return shutil.which(str(beside.absolute()) if "/" in name else name)
 
     def without_effect(self) -> list[str]:
-        """Say which keys change nothing."""
+        """Return a sentence for each key that has no effect."""
         said = [] if self.on_failure == "restart" else self.idle(
             "most_restarts", because='as on_failure is "stop"'
         )  # fmt: skip
@@ -146,7 +146,7 @@ class Process(Component):
         return None if rate is None else ClockSpec(rate, parameters.offset_s)
 
     def offer(self, port: str) -> Any:
-        """Say that detections may have a range; of the rest, nothing."""
+        """Return that detections may have a range, and nothing about their accuracy."""
         return (
             SensorOffer(measures_range=True, resolution_rad=0.0) if port == "detections" else None
         )
@@ -168,12 +168,12 @@ class Process(Component):
     def start(self) -> None:
         """Start the program ahead of the first call."""
         if not self._link.runs:
-            self._greet()
+            self._start_program()
 
     # -- calls ---------------------------------------------------------------------------------
 
     def run(self, wake: Wake) -> Mapping[str, Message] | None:
-        """Ask the program at every instant of the wake."""
+        """Send the inputs of every instant of the wake-up to the program; return its answers."""
         parts: dict[str, list[Message]] = {}
         arrivals = wake.arrivals("received")
         for row, tick in enumerate(wake.ticks.tolist()):
@@ -218,7 +218,7 @@ class Process(Component):
             self._state = self._is_in.state = after[0].column(0)[0].as_py()
         return [(about, table) for about, table in answer if about.get("table") != _STATE]
 
-    def _greet(self) -> None:
+    def _start_program(self) -> None:
         self._link.start()
         about = {
             "version": VERSION, "block": self.name, "ticks_per_s": str(self.context.ticks_per_s),

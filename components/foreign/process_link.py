@@ -61,7 +61,7 @@ class ProcessLink:
 
     @property
     def runs(self) -> bool:
-        """Whether it was started and not ended since."""
+        """Return whether the program was started and has not ended since."""
         return self._process is not None
 
     def start(self) -> None:
@@ -152,7 +152,7 @@ class ProcessLink:
             return
         if not content:
             raise ProcessError(
-                self._how_it_ended() + (" in the middle of a message" if reader.is_partial else "")
+                self._describe_end() + (" in the middle of a message" if reader.is_partial else "")
             )
         reader.add(content)
 
@@ -165,7 +165,7 @@ class ProcessLink:
             return bool(said)
         return True
 
-    def _how_it_ended(self) -> str:
+    def _describe_end(self) -> str:
         with suppress(subprocess.TimeoutExpired):
             return describe_exit(self._process.wait(1.0))
         return "closed its output"
@@ -195,11 +195,11 @@ class _Frames:
 
     @property
     def is_partial(self) -> bool:
-        """Whether something came, and not all."""
+        """Return whether part of a frame has come, but not all."""
         return bool(self._head or self._frames or self._body is not None)
 
     def add(self, content: bytes) -> None:
-        """Take bytes."""
+        """Append received bytes."""
         view = memoryview(content)
         while len(view):
             if self.done:

@@ -93,7 +93,7 @@ class RecordedSensorParameters(Parameters):
         return self
 
     def without_effect(self) -> list[str]:
-        """Say which keys change nothing."""
+        """Return a sentence for each key that has no effect."""
         if self.place is None or self.file.suffix in _RADARS:
             return []
         keys = ("radar_lat_deg", "radar_lon_deg", "radar_alt_m")
@@ -138,7 +138,7 @@ class RecordedSensor(Component):
         return Fraction(math.floor(self._read_measurements.arrival_s.max()) + 1)
 
     def offer(self, port: str) -> SensorOffer:
-        """Say what the sensor measures, how well, and how late it comes."""
+        """Return what the recorded sensor measures, its errors, and its latency."""
         late = self._ticks(self._read_measurements.arrival_s) - self._ticks(
             self._read_measurements.time_s
         )
@@ -153,7 +153,7 @@ class RecordedSensor(Component):
 
     @cached_property
     def _sensor_offer(self) -> SensorOffer | None:
-        """What the sensor's model says of itself."""
+        """Return the declaration of the sensor's model, or None without a model."""
         path, block = self.p.model, self.p.block
         if path is None:
             path = Path(self.p.file) / "scene.toml"
@@ -261,7 +261,7 @@ class RecordedSensor(Component):
         )  # fmt: skip
 
     def warnings(self) -> list[str]:
-        """Say what was left out, and how many looks come after the end."""
+        """Return warnings on rows that were left out, and on looks that come after the end."""
         late = int(
             np.count_nonzero(self._read_measurements.arrival_s >= float(self.context.duration_s))
         )

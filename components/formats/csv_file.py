@@ -239,7 +239,7 @@ def _first_of_seconds(
     rows: Iterator[tuple[int, list[str]]], identity: int, columns: Mapping[str, SampleColumn],
     warnings: list[str],
 ) -> Iterator[tuple[int, list[str]]]:  # fmt: skip
-    """Give rows with a position of one name that are a second apart or more."""
+    """Yield rows with a position of one name that are at least a second apart."""
     time, lat, lon = (columns[key].index for key in ("time", "lat", "lon"))
     parse, last, left_out = time_parser(columns["time"]), dict[str, float](), 0
     for number, row in rows:
@@ -280,7 +280,7 @@ def _time_cell(row: list[str], time: int, other: int) -> str:
 
 
 def _seem_feet(recording: Recording) -> bool:
-    """Tell whether altitudes come in steps of 25, as transponders report feet."""
+    """Return whether altitudes come in steps of 25, as transponders report feet."""
     heights = np.unique(np.concatenate([one["alt"] for one in recording.samples.values()]))
     steps = not np.any(heights % 25.0)
     return steps and len(heights) >= _FEW_HEIGHTS and bool(np.any(heights % 100.0))

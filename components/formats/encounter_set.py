@@ -92,9 +92,7 @@ class EncounterSet:
         return replace(kept, skipped=self.skipped + len(indices))
 
     def common_samples(self, index: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-        """Give for each intruder the times (n,) of both paths' samples at which both are there, and
-        north, east and altitude (3, n) of the ownship and of the intruder.
-        """
+        """Yield the times (n,) and both positions (3, n) of samples shared with each intruder."""
         first, end = (int(self.first_rows[index + k]) for k in (0, 1))
         own = self.path(first)
         for row in range(first + 1, end):
@@ -172,7 +170,7 @@ _PAIRS_AT_ONCE = 256
 def pair_paths(
     encounters: Sequence[tuple[EncounterSet, int]], dynamics: str
 ) -> Iterator[tuple[IntArray, PairPaths]]:
-    """Give the paths of ownships and intruders in blocks of pairs, and of which encounter each is.
+    """Yield the paths of ownships and intruders in blocks of pairs, with encounter numbers.
 
     Encounters are a set and an index there; of an encounter the intruders are in order.
     """

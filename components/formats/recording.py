@@ -34,13 +34,13 @@ class ReadingNotes:
         self._of_aircraft: dict[tuple[str, bool], list[str]] = {}
 
     def note_aircraft(self, name: str, kind: str, text: str, *, harmless: bool = False) -> None:
-        """Note what holds of one aircraft; of those of a kind the first is told, and how many."""
+        """Add a note on one aircraft; of notes of one kind the first is kept, and their number."""
         cases = self._of_aircraft.setdefault((kind, harmless), [])
         if f"{name}: {text}" not in cases[-1:]:
             cases.append(f"{name}: {text}")
 
     def settle(self) -> None:
-        """Put what was noted of single aircraft behind what holds of all."""
+        """Append the notes on single aircraft to those that hold of all."""
         for (_, harmless), cases in self._of_aircraft.items():
             more = f" (and {len(cases) - 1} more aircraft)" if len(cases) > 1 else ""
             (self.harmless if harmless else self.warnings).append(cases[0] + more)

@@ -38,7 +38,7 @@ class ColumnSpec:
 
     @property
     def units(self) -> Mapping[str, float]:
-        """What the units are worth that its column may have: those of the kind of its own."""
+        """Return the factor of each unit that the column may have, by the kind of its own unit."""
         return next(kind for kind in UNIT_KINDS if self.unit in kind)
 
 
@@ -86,12 +86,12 @@ _MISSING = frozenset(
 
 
 def is_missing(cell: str) -> bool:
-    """Tell whether a cell says that nothing is known."""
+    """Return whether a cell says that its value is unknown."""
     return cell.strip().lower() in _MISSING
 
 
 def with_velocity(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Put east, north, up velocity in place of vx vy vz or trk gs vs, if either is complete."""
+    """Return columns with east, north, up velocity in place of vx vy vz or trk gs vs."""
     kinds = [[columns.pop(part, None) for part in parts] for parts in VELOCITIES]
     for kind, (first, second, third) in enumerate(kinds):
         if first is not None and second is not None and third is not None:
@@ -205,7 +205,7 @@ def take_rows(columns: dict[str, FloatArray], rows: Any) -> None:
 
 
 def are_of_one_second(columns: dict[str, FloatArray], at_once: Any) -> bool:
-    """Tell whether samples at one instant are near each other: the clock is coarse."""
+    """Return whether samples of one instant are close together, as a coarse clock makes them."""
     return columns.keys() >= _OF_A_SECOND.keys() and all(
         bool((np.abs(np.diff(columns[key])[at_once]) <= most).all())
         for key, most in _OF_A_SECOND.items()

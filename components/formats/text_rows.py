@@ -26,25 +26,25 @@ from dsa_des.files.input_files import (
 from dsa_des.text.safe_text import shorten
 
 
-def _named(*units: tuple[str, float]) -> dict[str, float]:
+def _factors_by_name(*units: tuple[str, float]) -> dict[str, float]:
     """Return what units are worth by each of their names."""
     return {name: worth for names, worth in units for name in names.split()}
 
 
-LENGTH_M = _named(
+LENGTH_M = _factors_by_name(
     ("m metre metres meter meters", 1.0), ("km", 1000.0), ("cm", 0.01), ("mm", 0.001),
     ("ft foot feet", FOOT_M), ("nmi nm", NAUTICAL_MILE_M),
 )  # fmt: skip
-SPEED_MPS = _named(
+SPEED_MPS = _factors_by_name(
     ("m/s mps", 1.0), ("km/h kph kmh", 1.0 / 3.6),
     ("knot knots kn kt kts", NAUTICAL_MILE_M / 3600.0), ("mph mi/h", 1609.344 / 3600.0),
     ("cm/s", 0.01), ("nmi/h", NAUTICAL_MILE_M / 3600.0), ("nmi/s", NAUTICAL_MILE_M),
     ("fpm ft/min", FOOT_M / 60.0), ("ft/s fps", FOOT_M),
 )  # fmt: skip
-ANGLE_DEG = _named(
+ANGLE_DEG = _factors_by_name(
     ("deg degree degrees", 1.0), ("rad radian radians", 180.0 / math.pi), ("1e-7deg dege7", 1e-7)
 )
-TIME_S = _named(
+TIME_S = _factors_by_name(
     ("s sec second seconds", 1.0), ("ms millisecond milliseconds", 1e-3), ("us µs", 1e-6),
     ("ns", 1e-9), ("min", 60.0), ("h hr", 3600.0),
 )  # fmt: skip
@@ -56,7 +56,7 @@ ALL_TOKENS = {token for kind in UNIT_KINDS for token in kind}
 
 
 def clean_token(token: str) -> str:
-    """Take a unit token to its plain form: no brackets, no blanks, lower case."""
+    """Return a unit token in its plain form: no brackets, no blanks, lower case."""
     return re.sub(r"[\s\[\](){}]", "", token).lower()
 
 
@@ -124,7 +124,7 @@ class Problems:
         self._more = 0
 
     def add(self, problem: str, *, line: int | None = None, column: str | None = None) -> None:
-        """Note a problem, with its line and column where it has them."""
+        """Add a problem, with its line and column where known."""
         where = [f"{self.of} {line}"] if line is not None else []
         where += [f"column {column}"] if column is not None else []
         if len(self._lines) < self._most:
@@ -143,7 +143,7 @@ class Problems:
         raise TrafficFileError(self.path, lines)
 
     def fail(self, problem: str, *, line: int | None = None, column: str | None = None) -> NoReturn:
-        """Note a problem that makes reading on pointless, and raise."""
+        """Raise with a problem after which reading on is pointless, and all problems so far."""
         self.add(problem, line=line, column=column)
         self.raise_if_any()
         raise AssertionError
@@ -225,7 +225,7 @@ _LINE = re.compile(r"[^\r\n]+|\r\n|\r|\n")
 
 
 def each_line(text: str) -> Iterator[tuple[int, str]]:
-    """Give the lines that hold something, numbered from 1, as they are wanted."""
+    """Yield the lines that are not blank, numbered from 1, as they are wanted."""
     number = 1
     for match in _LINE.finditer(text):
         line = match[0]
@@ -291,7 +291,7 @@ _FRAME, _HEAD = re.compile(r"[+|]?-[-+]+-[+|]?"), 30
 
 
 def without_frame(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-    """Give the rows of a table that a shell drew (Impala's, Trino's), its names once."""
+    """Yield the rows of a table framed by a shell (Impala, Trino), its header once."""
     head = list(islice(lines, _HEAD))
     names = ""
     if not any(_FRAME.fullmatch(text) for _, text in head):

@@ -70,7 +70,7 @@ def _numbers(path: Path, line: int, cells: Sequence[str]) -> list[float]:
 
 
 def is_track_file(path: Path) -> bool:
-    """Tell whether a file is one of these formats, or cannot be told from them."""
+    """Return whether a file has one of these formats, or may have."""
     if path.suffix.lower() == ".mat":
         return True
     try:

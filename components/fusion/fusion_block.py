@@ -96,7 +96,7 @@ class Fusion(Component):
         return [FusedWithPose] if navigation_errs(self.context) else [*super().records()]
 
     def offer(self, port: str) -> Any:
-        """Hand on what the sensors say of themselves, by name, and how late they come."""
+        """Return the sensors' declarations by name, with the latency of each."""
         waits_s = Fraction(self.window_s())
         return {
             one.block: replace(

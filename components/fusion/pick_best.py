@@ -44,7 +44,7 @@ class PickBest(Fusion):
     ladders = (FUSION_LADDER,)
 
     def left_out(self) -> list[str]:
-        """Say what decides here which detections belong together."""
+        """Return a sentence on how detections are combined here."""
         return [
             "association by truth: detections of the same target are put together, whatever was "
             "measured, and a false alarm with none (fusion.gated goes by measured values alone)"
@@ -55,7 +55,7 @@ class PickBest(Fusion):
         return self.p.coincidence_s
 
     def warnings(self) -> list[str]:
-        """Say that the sensors' reports never come within ``coincidence_s``."""
+        """Return a warning where the sensors' reports never fall within ``coincidence_s``."""
         clocks = [clock for one in self.context.producers if (clock := _reports(one)) is not None]
         if len(clocks) < 2 or len(clocks) < len(self.context.producers):
             return super().warnings()

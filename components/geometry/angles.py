@@ -18,7 +18,7 @@ RAD_PER_DEG = np.pi / 180.0
 
 
 def local_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> tuple[Vector, Vector, Vector]:
-    """Give the unit vectors east, north and up at a position (degrees), in Earth-centred axes.
+    """Return the unit vectors east, north and up at a position (degrees), in Earth-centred axes.
 
     Each is its (x, y, z) components; up is the ellipsoid normal.
     """
@@ -155,7 +155,7 @@ def wrap_heading_rad(angle: FloatArray) -> FloatArray:
 
 
 def remainder(angle: FloatArray, turn: float) -> FloatArray:
-    """Give the remainder of angles by a turn, in [0, turn)."""
+    """Return the remainder of angles by a turn, in [0, turn)."""
     rest = np.mod(angle, turn)
     return np.where(rest >= turn, 0.0, rest)
 
@@ -179,7 +179,7 @@ _LARGE_LONGITUDE_DEG = 1e12
 
 
 def sine_and_cosine(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Take sine and cosine; once, where all angles are the same.
+    """Return sine and cosine of angles, computed once where all are the same.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def sine_and_cosine(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def slope_angle(rise: FloatArray, run: FloatArray) -> FloatArray:
-    """Give arctan2(rise, run) for a run of 0 or more; 0 where both are 0.
+    """Return arctan2(rise, run) for a run of 0 or more; 0 where both are 0.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def slope_angle(rise: FloatArray, run: FloatArray) -> FloatArray:
 
 
 def direction_angle(across: FloatArray, along: FloatArray) -> FloatArray:
-    """Give arctan2(across, along), 0 where both are 0: as `slope_angle`, for all four quadrants.
+    """Return arctan2(across, along), 0 where both are 0: as `slope_angle`, for all four quadrants.
 
     Within 4e-16 rad, in [-pi, pi], in 0.6 of the time of arctan2; `along` is 0 or at least 1e-200
     in size.
@@ -264,7 +264,7 @@ def longitude_difference_deg(
 
 
 def longitude_difference_rounded(lon1: FloatArray, lon2: FloatArray) -> FloatArray:
-    """Give the double nearest to lon2 - lon1 in [-180, 180), for checked arrays of one axis up."""
+    """Return the double nearest to lon2 - lon1 in [-180, 180), for checked arrays."""
     total, low = _two_difference(lon1, lon2)
     largest = max(total.max(initial=0.0), -total.min(initial=0.0))
     if largest < _LESS_THAN_HALF_A_TURN_DEG:
@@ -285,7 +285,7 @@ def _longitude_difference(lon1: FloatArray, lon2: FloatArray) -> tuple[FloatArra
 
 
 def _reduce_longitude(lon: FloatArray) -> FloatArray:
-    """Take whole turns off absurdly large longitudes, exactly, and leave all others alone."""
+    """Return longitudes with whole turns removed from absurdly large ones, exactly."""
     if lon.size == 0 or max(lon.max(), -lon.min()) <= _LARGE_LONGITUDE_DEG:
         return lon
     return np.where(np.abs(lon) > _LARGE_LONGITUDE_DEG, np.fmod(lon, 360.0), lon)

@@ -85,7 +85,7 @@ def body_to_ned(
 
 @np.errstate(under="ignore")
 def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Vector:
-    """Give the unit vector of a direction, in NED.
+    """Return the unit vector of a direction, in NED.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def line_of_sight_in_target_axes(
     target_pitch_rad: npt.ArrayLike,
     target_roll_rad: npt.ArrayLike,
 ) -> Vector:
-    """Give the unit vector from the observer to the target in the target's body axes.
+    """Return the unit vector from the observer to the target in the target's body axes.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def body_angles_unchecked(
 
 
 def azimuth_off_nose(azimuth: FloatArray, z: FloatArray, level: FloatArray) -> FloatArray:
-    """Put an azimuth into (-pi, pi], and to 0 for what points along z; level is hypot(x, y)."""
+    """Return azimuths in (-pi, pi], 0 along z; level is hypot(x, y)."""
     azimuth[azimuth <= -np.pi] = np.pi
     azimuth[level <= _ZENITH_RAD * np.abs(z)] = 0.0
     azimuth += 0.0

@@ -24,7 +24,7 @@ def angle_between(
     second_azimuth_rad: ArrayLike,
     second_elevation_rad: ArrayLike,
 ) -> Any:
-    """Give the angle between two directions, exact at every separation.
+    """Return the angle between two directions, exact at every separation.
 
     atan2(|a × b|, a·b) of the two unit vectors, with cross and dot product written in differences
     of the angles so that a small separation keeps its digits: azimuths that wrap and directions
@@ -62,7 +62,7 @@ def angle_by_haversine(
     other_azimuth_rad: FloatArray,
     other_elevation_rad: FloatArray,
 ) -> FloatArray:
-    """Give the angle between two directions (rad, of one shape) by the haversine; NaN stays NaN.
+    """Return the angle between two directions (rad, of one shape) by the haversine; NaN stays NaN.
 
     Accurate when it is small; near pi only half of the digits are right.
     """
@@ -74,25 +74,25 @@ def angle_by_haversine(
 
 
 def unit_vectors(azimuth_rad: FloatArray, elevation_rad: FloatArray) -> FloatArray:
-    """Give unit vectors in NED, components along the last axis; angles are not checked."""
+    """Return unit vectors in NED, components along the last axis; angles are not checked."""
     return np.stack(unit_vector_unchecked(azimuth_rad, elevation_rad), axis=-1)
 
 
 def angle_between_vectors(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Give the angle (rad) between vectors (..., 3) of any length, accurate if small, too."""
+    """Return the angle (rad) between vectors (..., 3) of any length, accurate if small, too."""
     across = np.linalg.norm(np.cross(one, other), axis=-1)
     apart: FloatArray = np.arctan2(across, (one * other).sum(axis=-1))
     return apart
 
 
 def chord_between(one: Vector, other: Vector) -> FloatArray:
-    """Give the distance between the tips of two unit vectors, in [0, 2]."""
+    """Return the distance between the tips of two unit vectors, in [0, 2]."""
     x, y, z = (a - b for a, b in zip(one, other, strict=True))
     chord: FloatArray = np.sqrt(x * x + y * y + z * z)
     return chord
 
 
 def angle_of_chord(chord: FloatArray) -> FloatArray:
-    """Give the angle between two unit vectors from the distance of their tips, rad, in [0, pi]."""
+    """Return the angle (rad, 0 to pi) between unit vectors from the distance of their tips."""
     apart: FloatArray = 2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord))
     return apart

@@ -187,7 +187,7 @@ def north_east_up(
     lon2: FloatArray,
     alt2: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Give the target's north, east and up offsets in m, without checks; see `line_of_sight_ned`.
+    """Return a target's north, east and up offsets in m, unchecked; see `line_of_sight_ned`.
 
     Degrees and m, contiguous, at least one axis, in bounds.
     """

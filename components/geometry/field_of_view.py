@@ -42,7 +42,7 @@ class FieldOfView:
         self._turns = _turns(self._low, self._high)
 
     def holds(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> BoolArray:
-        """Tell which directions lie inside; bounds are."""
+        """Return which directions lie inside the field of view, its bounds included."""
         result = elevation_rad >= self._lowest
         result &= elevation_rad <= self._highest
         if self._high - self._low < TWO_PI:
@@ -58,12 +58,12 @@ class FieldOfView:
 
 
 def rising_sector(low_rad: float, high_rad: float) -> tuple[float, float]:
-    """Give a sector's bounds with the upper one a turn on where it was below the lower one."""
+    """Return a sector's bounds, the upper one a turn higher if it was below the lower one."""
     return low_rad, high_rad + TWO_PI if high_rad < low_rad else high_rad
 
 
 def sector_width_rad(low_rad: float, high_rad: float) -> float:
-    """Give the angle clockwise from the first azimuth to the second, in (0, 2 pi] and rounding."""
+    """Return the angle clockwise from the first azimuth to the second, in (0, 2 pi]."""
     return high_rad - low_rad if high_rad > low_rad else high_rad - low_rad + TWO_PI
 
 

@@ -164,7 +164,7 @@ class AltitudeConflicts:
                 self._seconds.append((time_s, due & nearly_equal(span.begin_s, time_s)))
 
     def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Tell which flights meet it."""
+        """Return which altitude changes conflict within the horizon."""
         end_s = np.minimum(self._conflicts_after(horizon_s, self._level_s), self._lookahead_s)
         begin_s = np.maximum(from_s, self._level_s)
         met = meets(self._level, begin_s, end_s) | meets_at(self._level, from_s, begin_s, end_s)
@@ -183,7 +183,7 @@ class AltitudeConflicts:
     conflicts_soon = unsafe
 
     def conflicts_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
-        """Tell which flights meet it until a time (n, 1)."""
+        """Return which altitude changes conflict before a time (n, 1)."""
         horizon_s = np.minimum(horizon_s, self._lookahead_s)
         until_s = np.minimum(until_s, horizon_s)
         late = (self._level_s > horizon_s) & self._from_now

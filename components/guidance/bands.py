@@ -107,7 +107,7 @@ def _stretches(
 
 
 def is_red(band: Band, least: int) -> bool:
-    """Tell whether a band is as bad as region number `least`; one of recovery never is."""
+    """Return whether a band is of region `least` or worse; a recovery band is not."""
     return band.region != "RECOVERY" and REGIONS.index(band.region) >= least
 
 
@@ -144,7 +144,7 @@ class Guidance(NamedTuple):
 
     @property
     def recovers(self) -> bool:
-        """Whether what is free is shown as RECOVERY."""
+        """Return whether free values are shown as RECOVERY bands."""
         return self.recovery is not None and self.recovery.time_s >= 0.0
 
 

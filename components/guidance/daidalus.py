@@ -202,14 +202,14 @@ class DaidalusGuidance(Component):
         self._configuration, self._alerter = self.p.read()
 
     def warnings(self) -> list[str]:
-        """Say where no alert reaches its level, or no level has bands."""
+        """Return a warning where no alert reaches its level, or no level has bands."""
         said = note_unreached_level("level", self.p.level, self.context.producers)
         if all(level.region == "NONE" for level in self._alerter.levels):
             said.append(f"no level of the alerter {self._alerter.name} has a region: no bands")
         return said
 
     def run(self, wake: Wake) -> GuidanceBands | None:
-        """Give the bands of every instant with an alert."""
+        """Return the bands of every instant with an alert."""
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None

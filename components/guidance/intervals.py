@@ -27,7 +27,7 @@ class Interval(NamedTuple):
 
 
 def is_same_value(one: float, other: float) -> bool:
-    """Tell whether two guidance values are one place.
+    """Return whether two guidance values are equal.
 
     As `nearly_equal` of `components.well_clear.relative_motion`, for two numbers at a time: arrays
     are ten times as slow.

@@ -37,7 +37,7 @@ class Steps(NamedTuple):
 
     @property
     def instantaneous(self) -> bool:
-        """Whether a manoeuvre takes no time."""
+        """Return whether a manoeuvre takes no time."""
         return not self.step_time_s.any()
 
     def find_conflicts(self, intruder: State, detector: Detector) -> "StepConflicts":
@@ -142,7 +142,7 @@ class StepConflicts:
             self._while_flown = meets(self._span, steps.time_s, lasts_s) & steps.there
 
     def conflicts_soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Tell which steps meet it after the manoeuvre."""
+        """Return which steps lead to a conflict after the manoeuvre."""
         time_s = self._steps.time_s
         begin_s = np.maximum(from_s, time_s)
         end_s = np.minimum(self._lookahead_s, horizon_s + self._after_s)
@@ -150,7 +150,7 @@ class StepConflicts:
         return np.asarray(met & self._steps.there & np.asarray(from_s <= horizon_s))
 
     def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Tell which steps meet it, or lie beyond one that meets it while it is flown."""
+        """Return which steps conflict, or lie beyond one that does while it is flown."""
         met = self.conflicts_soon(from_s, horizon_s)
         if self._steps.instantaneous:
             return met
@@ -164,7 +164,7 @@ class StepConflicts:
         return met | self._conflicts_beyond(self._while_flown & due)
 
     def conflicts_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
-        """Tell which steps meet it until a time (n, 1), or while they are flown until then."""
+        """Return which steps conflict before a time (n, 1), flown until then."""
         horizon_s = np.minimum(horizon_s, self._lookahead_s)
         until_s = np.minimum(until_s, horizon_s)
         late = (self._steps.time_s > horizon_s) & self._steps.from_now

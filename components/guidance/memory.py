@@ -42,7 +42,7 @@ class BandMemory:
     def step(
         self, now_s: float, line: list[Band], own_value: float, recovery: Recovery | None
     ) -> list[Band]:
-        """Take in the bands of one instant, and return them as remembered."""
+        """Update the memory with the bands of one instant, and return the remembered bands."""
         since_s = None if self._last_s is None else now_s - self._last_s
         if since_s is None or not 0.0 < since_s <= self._hysteresis_s:
             self._clear()
@@ -77,7 +77,7 @@ class BandMemory:
             self._queues = [
                 (self._first(a), self._first(b)) for a, b in zip(left, right, strict=True)
             ]
-        self._meet(places, left, right)
+        self._split_at_common_places(places, left, right)
         result: list[int] = []
         for queues, a, b in zip(self._queues, left, right, strict=True):
             for queue, colour in zip(queues, (a, b), strict=True):
@@ -99,8 +99,10 @@ class BandMemory:
     def _first(self, colour: int) -> list[int]:
         return [colour] * self._m + [_OUTSIDE] * (self._n - self._m)
 
-    def _meet(self, places: list[float], left: list[int], right: list[int]) -> None:
-        """Let the line and the memory hold the same places, one for one, from the lowest on."""
+    def _split_at_common_places(
+        self, places: list[float], left: list[int], right: list[int]
+    ) -> None:
+        """Split bands of line and memory at common places, so that they match one for one."""
         at = 0
         while at < max(len(places), len(self._places)):
             mine = self._places[at] if at < len(self._places) else math.inf
@@ -223,7 +225,7 @@ class ResolutionMemory:
         own_value: float,
         recovery: Recovery | None,
     ) -> Resolution | None:
-        """Take in the resolution of one instant, and return the one that is shown."""
+        """Update the memory with the resolution of one instant, and return the one to show."""
         since_s = None if self._last_s is None else now_s - self._last_s
         if since_s is None or not 0.0 < since_s <= self._hysteresis_s:
             self._clear()
@@ -248,7 +250,7 @@ class ResolutionMemory:
     def _keeps(
         self, side: int, raw: float, bands: list[Band], own_value: float, holds: bool
     ) -> bool:
-        """Tell whether the way out that was shown stays; `holds` however far it is."""
+        """Return whether the shown resolution stays; `holds` keeps it however far it is."""
         old = self._shown[side]
         if not (math.isfinite(old) and math.isfinite(raw)):
             return False
@@ -274,7 +276,7 @@ class ResolutionMemory:
         return next((i for i in reversed(free) if is_same_value(bands[i].high, edge)), -1)
 
     def _leads(self, start: int, end: int, bands: list[Band]) -> bool:
-        """Tell whether bands lead to another one, towards the preferred side, and none is red."""
+        """Return whether bands lead to another one on the preferred side without a red one."""
         if start < 0:
             return False
         at = start
@@ -339,7 +341,7 @@ class GuidanceMemory:
         self._resolutions = ResolutionMemory(configuration, kind_name)
 
     def step(self, now_s: float, guided: Guidance) -> Remembered:
-        """Take in the guidance of one instant, later than the last, and return what is shown."""
+        """Update the memory with the guidance of one instant, and return what is shown."""
         own_value, recovery = guided.own_value, guided.recovery
         bands = self._bands.step(now_s, guided.line, own_value, recovery)
         way = resolution(bands, own_value, self._corrective, self._cyclic)

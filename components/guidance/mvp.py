@@ -44,7 +44,7 @@ class PotentialParameters(Parameters):
     )  # fmt: skip
 
     def without_effect(self) -> list[str]:
-        """Say that its own way is flown at the largest speed, where that is slower."""
+        """Return a sentence where the own speed is above the largest, at which it is flown."""
         said = super().without_effect()
         if self.speed_mps <= self.most_mps:
             return said
@@ -78,7 +78,7 @@ class VoltagePotential(Component):
         return False
 
     def request(self, port: str) -> FarthestLook | None:
-        """Ask for no target in the states: of these only one's own place is read."""
+        """Return a request for no targets in the states: only the own position is read."""
         return FarthestLook(0.0) if port == "states" else None
 
     def setup(self) -> None:

@@ -163,7 +163,7 @@ class _Search:
         return has_interval(self._kind, clear)
 
     def _clear_of_cylinder(self) -> BoolArray:
-        """Tell which values keep clear of the cylinder alone."""
+        """Return which values keep clear of the cylinder alone."""
         clear = self._kind.there.copy()
         for one, cylinder in zip(self._concerned, self._cylinders, strict=True):
             unsafe = cylinder.unsafe(0.0, one.horizon_s)
@@ -171,7 +171,7 @@ class _Search:
         return clear
 
     def _is_clear_until(self, time_s: FloatArray) -> BoolArray:
-        """Tell which values keep clear of the cylinder until a time (r, 1), and of all then.
+        """Return which values keep clear of the cylinder until a time (r, 1), and of all after.
 
         Beyond the horizon of an intruder only the cylinder counts, as far as that horizon.
         """

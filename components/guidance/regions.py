@@ -92,7 +92,7 @@ class Regions:
         return self._concerned[region]
 
     def clear(self, region: str) -> tuple[BoolArray, BoolArray]:
-        """Return which rows any level assigns to the region, and which values (n, k) avoid it."""
+        """Return rows (n,) where a level assigns the region, and its safe values (n, k)."""
         known, concerned = self.concerned_intruders(region)
         clear = self._kind.there.copy()
         for one in concerned:
@@ -149,7 +149,7 @@ class Regions:
 
 
 def has_interval(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:
-    """Tell in which rows (n, k) two neighbours are clear, and not both beyond a limit."""
+    """Return in which rows (n, k) two neighbours are clear, and not both beyond a limit."""
     both = clear[:, :-1] & clear[:, 1:]
     if not kind.cyclic:
         low = np.maximum(kind.values[:, :-1], kind.least[:, np.newaxis])

@@ -54,13 +54,13 @@ class Detector:
 
 
 def meets(span: Span, begin_s: Any, end_s: Any) -> BoolArray:
-    """Tell whether a volume is met in part of the time that was looked at; never in none."""
+    """Return whether a volume is violated during part of the examined time."""
     result = is_surely_less(np.maximum(span.begin_s, begin_s), np.minimum(span.end_s, end_s))
     return np.asarray(result & (np.asarray(begin_s) < end_s))
 
 
 def meets_at(span: Span, from_s: Any, begin_s: Any, end_s: Any) -> BoolArray:
-    """Tell whether a volume is met at an instant: where `from_s` leaves no more of the time."""
+    """Return whether a volume is violated at an instant, if `from_s` leaves no more time."""
     alone = np.asarray((begin_s == end_s) & (from_s == end_s))
     if not alone.any():
         return alone

@@ -112,7 +112,7 @@ class LaserParameters(RangeErrorParameters, SensorParameters):
         return self
 
     def without_effect(self) -> list[str]:
-        """Say that a single shot needs no pattern."""
+        """Return a sentence if a scan's single shot cannot give the hits that are needed."""
         said = super().without_effect()
         if self.pattern == "one_shot" and self.hits_needed > 1:
             said.append("hits_needed is more than the one shot of a scan: nothing is detected")
@@ -138,7 +138,7 @@ class LaserExtinction(Effect[float]):
     builds = _extinction_per_m
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``[weather]`` for a visibility, fog or rain."""
+        """Return whether air attenuates pulses: needs visibility, fog or rain in ``[weather]``."""
         per_m = _extinction_per_m(block)
         if not per_m:
             return Verdict(False, "[weather] has no visibility_km, no rain and no fog")
@@ -208,7 +208,7 @@ class ScanningLaser(SweepingSensor):
         self._extinction_per_m = 0.0
 
     def setup(self) -> None:
-        """Take what the scene's air does to a pulse, and refuse cues."""
+        """Store the air's attenuation of pulses, and raise if the scanner is wired to cues."""
         refuse_cues(self, "its pattern is fixed, with one threshold")
         self._extinction_per_m = self.built_one(EXTINCTION) or 0.0
 

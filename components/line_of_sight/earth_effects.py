@@ -51,7 +51,7 @@ class Limb(Effect[Hides]):
     outside_the_proof = "an Earth that hides nothing is none"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``[terrain] horizon``."""
+        """Return whether the Earth hides targets: needs ``[terrain] horizon``."""
         horizon = terrain_section(block).horizon
         return Verdict(horizon, f"[terrain] horizon is {str(horizon).lower()}")
 
@@ -72,7 +72,7 @@ class Mountains(Effect[Hides]):
     outside_the_proof = "without a raster there is no ground"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``[terrain] raster``."""
+        """Return whether mountains hide targets: needs ``[terrain] raster``."""
         file = terrain_section(block).raster
         if file is None:
             return Verdict(False, "[terrain] raster is not given")
@@ -103,7 +103,7 @@ class Refraction(Effect[Bends]):
     outside_the_proof = "angles are formed anew, and their last bits differ"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``[terrain] refraction``."""
+        """Return whether rays bend: needs ``[terrain] refraction``."""
         refraction = terrain_section(block).refraction
         return Verdict(refraction != "none", f"[terrain] refraction is {refraction!r}")
 

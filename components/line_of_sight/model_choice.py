@@ -51,7 +51,7 @@ class Allowance:
     relative_range: float = math.inf
 
     def describe_excess(self, bound: ErrorBound) -> str:
-        """Say which bound is not allowed, or nothing."""
+        """Return which error bound is exceeded, or an empty string."""
         if bound.angle_rad > self.angle_rad:
             return (
                 f"an error in angle of {angle_text(bound.angle_rad)} cannot be excluded, and "

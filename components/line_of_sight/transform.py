@@ -62,7 +62,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
 
 
 def _straight(block: Any) -> str:
-    """Say that rays are straight where the scene says so; nothing where they bend."""
+    """Return a sentence where the scene has straight rays; an empty string where they bend."""
     bends = terrain_section(block).refraction != "none"
     return "" if bends else "[terrain] refraction is 'none': rays are straight"
 
@@ -187,7 +187,7 @@ class Transform(Component):
         self.rung: PickedModels | None = None
 
     def setup(self) -> None:
-        """Take what the ownship believes of itself, and the models to compute with."""
+        """Store the ownship's believed pose, and the geometry models to compute with."""
         self._beliefs = self.built(OWNSHIP)
         self._hiding = self.built(HIDES)
         self._bending = self.built(BENDS)
@@ -195,13 +195,13 @@ class Transform(Component):
         self._line_of_sight = LineOfSight(self.rung.earth, self.rung.attitude)
 
     def request(self, port: str) -> FarthestLook:
-        """Ask for the targets that a sensor downstream may look at, where they seem to be."""
+        """Return a request for the targets that a sensor downstream may look at."""
         look = farthest_look(consumer.request for consumer in self.context.consumers)
         earth = REFERENCE[0] if self.rung is None else self.rung.earth
         return seeming_look(self.context, earth, look)
 
     def left_out(self) -> list[str]:
-        """Say which models were picked, and why."""
+        """Return a sentence for each geometry model that was picked, with the reason."""
         return [] if self.rung is None else list(self.rung.sentences)
 
     def report(self) -> dict[str, Any]:

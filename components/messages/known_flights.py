@@ -22,7 +22,7 @@ class AllFlights(Protocol):
 
     @property
     def manoeuvre_count(self) -> int:
-        """How many these are: of two of one traffic, the one with more knows all of the other."""
+        """Return the number of manoeuvres; of two messages the larger knows all of the other."""
 
     @property
     def traffic(self) -> object:

@@ -137,7 +137,7 @@ class RelativeFlight:
 
     @property
     def is_short(self) -> bool:
-        """Whether its sample times are few enough to hold in one array."""
+        """Return whether its sample times are few enough for one array."""
         return self._count <= _KEPT
 
     @property
@@ -174,7 +174,7 @@ class RelativeFlight:
         return self.own.at(time_s), self.target.at(time_s)
 
     def pieces(self) -> Iterator[Separation]:
-        """Give the distances, about `MOST_AT_ONCE` at a time; those of a short run are kept."""
+        """Yield the distances in pieces of about `MOST_AT_ONCE`; those of a short run are kept."""
         if not self.is_short:
             yield from self._pieces()
             return
@@ -198,7 +198,7 @@ class RelativeFlight:
 
     @property
     def _targets_with_samples(self) -> list[int]:
-        """Which targets' samples are those of the two."""
+        """Return the targets whose sample times are those of the pair."""
         return [place for place in self.places if place >= 0]
 
     def _samples(self) -> list[SampleTimes]:

@@ -111,7 +111,7 @@ class Console(Component):
         return taken
 
     def _take_alerts(self, came: list[Arrivals], row: int, until: int | None) -> int:
-        """Take in alerts from a row on that have come by an instant; return the next row."""
+        """Process alerts from a row on that came by an instant; return the next row."""
         for arrived in came:  # one wire
             alerts: AlertLevels = arrived.message
             rows = len(alerts)
@@ -195,7 +195,7 @@ class Desk:
         self._open = True
 
     def submit(self, pending: PendingDecision) -> bool:
-        """Put a decision on the desk; False if the run is over or too many wait."""
+        """Add a decision to the desk; return False if the run is over or too many wait."""
         with self._lock:
             if not self._open or len(self._waiting) >= MOST_WAITING:
                 return False
@@ -203,13 +203,13 @@ class Desk:
             return True
 
     def take(self, time_s: float) -> list[PendingDecision]:
-        """Take all that waits, at an instant of the simulation."""
+        """Return and remove all waiting decisions, at an instant of the simulation."""
         with self._lock:
             result, self._waiting = self._waiting, []
         return result
 
     def close(self) -> list[PendingDecision]:
-        """Take nothing more; return what was never taken in, and so never acknowledged."""
+        """Close the desk; return decisions that were never taken, and so never acknowledged."""
         with self._lock:
             self._open = False
             result, self._waiting = self._waiting, []
@@ -238,7 +238,7 @@ class Human(Console):
     _taken: Sequence[PendingDecision] = ()
 
     def due(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
-        """Take what lies on the desk."""
+        """Return the decisions that wait on the desk."""
         if self.desk is None:
             return []
         tick = int(wake.ticks[-1])

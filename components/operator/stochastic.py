@@ -74,7 +74,7 @@ class StochasticParameters(ConfParameters):
     )
 
     @model_validator(mode="after")
-    def _settles(self) -> Self:
+    def _check_easing(self) -> Self:
         least_deg = LEAST_EASING_S * self.turn_rate_deg_s
         if 0.0 < self.eases_deg < least_deg:
             raise ValueError(
@@ -84,7 +84,7 @@ class StochasticParameters(ConfParameters):
         return self
 
     def without_effect(self) -> list[str]:
-        """Say which rate belongs to manoeuvres that are never made."""
+        """Return a sentence where a rate belongs to manoeuvres that are never made."""
         said = super().without_effect()
         if self.turn_share == 0.0:
             of_turns = "turn_rate_deg_s", "track_step_deg", "eases_deg"
@@ -154,7 +154,7 @@ class Stochastic(Component):
         return {"no change leads clear and the ownship is left alone": self._stuck}
 
     def warnings(self) -> list[str]:
-        """Say why it never steers, where that is so."""
+        """Return a warning where the operator never steers, with the reason."""
         return explain_no_steering(
             self.p.level, self._configuration, self._alerter, self.context.producers
         )
@@ -179,9 +179,7 @@ class Stochastic(Component):
         return Manoeuvres.at_rows(wake.instants, self._begin_manoeuvres(alerts, choosing, acting))
 
     def _has_to_do(self, wake: Wake, highest: IntArray) -> BoolArray:
-        """Tell at which rows something may change: nothing does without an alert, now or before,
-        nor while one lasts and a decision waits.
-        """
+        """Return at which rows a state may change: with an alert, or after one has ended."""
         missing = int(wake.run.max(initial=-1)) + 1 - len(self._next)
         self._next = np.concatenate([self._next, np.full(max(0, missing), np.inf)])
         alerted, due = highest >= self.p.level, self._next[wake.run]
@@ -223,9 +221,7 @@ class Stochastic(Component):
     def _follow(
         self, minds: list[Mind], ticks: IntArray, highest: Sequence[int]
     ) -> tuple[list[int], list[int]]:
-        """Let minds, of a run each, take in the highest level of an instant; return which choose at
-        it, and which act.
-        """
+        """Update operators, one a run, with the highest level; return who chooses and who acts."""
         per_s, at = self.context.ticks_per_s, ticks.tolist()
         early = self.p.chooses == "before_executing"
         for k, mind in enumerate(minds):

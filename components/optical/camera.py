@@ -121,7 +121,7 @@ class CameraParameters(GlintParameters, SensorParameters):
     )
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to errors, false alarms and rates that there are not."""
+        """Return a sentence for each key of errors, false alarms or rates that are switched off."""
         said = super().without_effect()
         if self.noise_equivalent_contrast == 0 and self.errors != "signal":
             said += self.idle("blur_pixels", because="there is no noise")
@@ -152,7 +152,7 @@ class CameraParameters(GlintParameters, SensorParameters):
 
     @property
     def reports_noise(self) -> bool:
-        """Whether there are false alarms in its reports."""
+        """Return whether its reports contain false alarms."""
         if self.false_alarms is not None:
             return self.false_alarms
         if self.false_alarms_per_frame is not None:
@@ -161,7 +161,7 @@ class CameraParameters(GlintParameters, SensorParameters):
 
     @property
     def states_false_alarms(self) -> bool:
-        """Whether two other keys say how many false alarms there are, few or many."""
+        """Return whether two other keys set the number of false alarms."""
         others = self.threshold, self.noise_equivalent_contrast, self.calibrate
         if self.noise_equivalent_contrast == 0.0 or others.count(None) != 1:
             return False
@@ -254,7 +254,7 @@ class Camera(Sensor):
         return f"{self.name} weighs the line of sight's rate (dynamic_weight is {weight:g})"
 
     def left_out(self) -> list[str]:
-        """Say beyond which range nothing can reach the threshold, and what `auto` came to."""
+        """Return sentences on the range beyond which nothing is detected, and on `auto` choices."""
         said = [*super().left_out()]
         if self.reach.range_max_m < self.stated_reach.range_max_m:
             range_km = self.reach.range_max_m / 1000.0
@@ -369,7 +369,7 @@ class Camera(Sensor):
         return float(min(self.detector.threshold, self.p.cued_threshold))
 
     def warnings(self) -> list[str]:
-        """Say which cues change nothing, and whose areas were made for another silhouette."""
+        """Return a warning for each cue without effect and each area of another silhouette."""
         said = [*super().warnings(), *cue_warnings(self)]
         for roster in known_targets(self.context) if self.areas else ():
             said += warn_of_other_fits(roster, self.areas, self.p.silhouette)

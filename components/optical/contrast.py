@@ -34,7 +34,7 @@ def contrast_gain(
     sky: str = "clear",
     background: str = "auto",
 ) -> Any:
-    """Give the factor P by which contrast multiplies the static signature (thesis eq. 18).
+    """Return the factor P by which contrast multiplies the static signature (thesis eq. 18).
 
     - ``constant``: `contrast` itself, the thesis's P.
     - ``daylight``: `contrast` times the target's own contrast |Lt - Lb| / Lb against its
@@ -80,7 +80,7 @@ def contrast_gain(
 
 
 def visibility_transmission(range_m: ArrayLike, visibility_m: ArrayLike) -> Any:
-    """Give the share of a contrast that is left after a path through haze.
+    """Return the share of a contrast that is left after a path through haze.
 
     exp(-3.912 range / visibility), Koschmieder's law. Exact for a target against the horizon sky
     in even haze; used for every background here.
@@ -106,7 +106,7 @@ class Background(Effect[CellValues]):
     outside_the_proof = "no sun leaves every target's contrast exactly as it is"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``background``."""
+        """Return whether contrast with a background is computed: needs ``background``."""
         background = block.p.background
         return Verdict(background != "none", f"background is {background!r}")
 

@@ -86,7 +86,7 @@ class ImageParameters(ElectroOpticalParameters):
         return self
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to a texture that there is not."""
+        """Return a sentence for each key of a texture that is switched off."""
         said = super().without_effect()
         if not self.texture_contrast:
             said += self.idle("texture_pixels", because="texture_contrast is 0")
@@ -160,7 +160,7 @@ class ImageCamera(ElectroOptical):
         self.patches: dict[tuple[int, int], AnyArray] = {}
 
     def request(self, port: str) -> Any:
-        """Ask for the flights too: the earlier frame is of an instant of its own."""
+        """Return a request for targets with flights: the earlier frame has its own instant."""
         return replace(super().request(port), lasts_s=self.p.frame_interval_s)
 
     def look(self, cells: Cells) -> Look:
@@ -375,7 +375,7 @@ class ImageCamera(ElectroOptical):
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return what the picture says of each cell."""
-        cued = {"cued": cells.is_cued()} if self._cueing else {}
+        cued = {"cued": cells.is_cued()} if self._cue_cones else {}
         return {**look.extras, **cued}
 
 

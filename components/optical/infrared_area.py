@@ -30,7 +30,7 @@ def plume_area(
     engine: str,
     plume_share_of_back: ArrayLike | None = None,
 ) -> Any:
-    """Give the extra area that the hot exhaust plume adds, growing from nose to tail aspect.
+    """Return the extra area of the hot exhaust plume, growing from nose to tail aspect.
 
     share · back · (1 + cos g)/2, with g the angle between the target's nose and the line of sight
     from us to it: 0 head-on, where the airframe hides the plume, half abeam, all of it from
@@ -69,7 +69,7 @@ def infrared_area(
     model: str = "exact",
     validate: bool = True,
 ) -> Any:
-    """Give the area that radiates towards an infrared camera (thesis eq. 20-21).
+    """Return the area that radiates towards an infrared camera (thesis eq. 20-21).
 
     The silhouette with separate front and back, plus the plume if an engine is named. Without an
     engine this is the thesis's model, whose tables already hold the doubled back (errata 23c):
@@ -112,7 +112,7 @@ class Plume(Effect[CellValues]):
     acts_on = AREA
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``plume``, and for a target whose engine has one."""
+        """Return whether plumes radiate: needs ``plume``, and a target whose engine has one."""
         if not block.p.plume:
             return Verdict(False, "plume is false")
         rosters = known_targets(block.context)

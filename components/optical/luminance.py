@@ -54,7 +54,7 @@ SKIES = {
 
 
 def find_sky(name: str) -> Sky:
-    """Give the sky condition of that name."""
+    """Return the sky condition of a name."""
     if name not in SKIES:
         raise ValueError(f"sky is {name!r}: it must be one of {', '.join(SKIES)}")
     return SKIES[name]
@@ -69,7 +69,7 @@ def daylight_sun(sun_elevation_rad: ArrayLike) -> FloatArray:
 
 
 def beam_illuminance(sun_elevation_rad: ArrayLike, sky: str = "clear") -> Any:
-    """Give the illuminance of the sun's beam on a surface across it.
+    """Return the illuminance of the sun's beam on a surface across it.
 
     127,500 lux · exp(-c / sin(elevation)); 0 under an overcast sky.
 
@@ -84,7 +84,7 @@ def beam_illuminance(sun_elevation_rad: ArrayLike, sky: str = "clear") -> Any:
 
 
 def sky_illuminance(sun_elevation_rad: ArrayLike, sky: str = "clear") -> Any:
-    """Give the illuminance of the whole sky on the level ground, without the sun's beam.
+    """Return the illuminance of the whole sky on the level ground, without the sun's beam.
 
     IES RP-21 (1984): A + B sin(elevation)^C.
     """
@@ -102,7 +102,7 @@ def sky_luminance(
     sun_elevation_rad: ArrayLike,
     sky: str = "clear",
 ) -> Any:
-    """Give the luminance of the sky in a direction, brighter round the sun and at the horizon.
+    """Return the luminance of the sky in a direction, brighter round the sun and at the horizon.
 
     The CIE standard general sky, scaled so that the whole sky gives `sky_illuminance`. The sun's
     disc itself is not part of it. Directions below the horizon get the horizon's luminance.
@@ -128,7 +128,7 @@ def sky_luminance(
 
 
 def _pattern(sin_elevation: FloatArray, from_sun_rad: FloatArray, sky: str) -> FloatArray:
-    """Give the unscaled CIE luminance: gradation times indicatrix."""
+    """Return the unscaled CIE luminance: gradation times indicatrix."""
     a, b = SKIES[sky].gradation
     c, d, e = SKIES[sky].indicatrix
     gradation = 1.0 + a * np.exp(b / np.maximum(sin_elevation, _SMALLEST_SINE))
@@ -162,7 +162,7 @@ BACKGROUNDS = ("sky", "ground", "auto")
 
 
 def inherent_contrast(target_cd_m2: ArrayLike, background_cd_m2: ArrayLike) -> Any:
-    """Give the contrast at the target, |Lt - Lb| / Lb."""
+    """Return the contrast at the target, |Lt - Lb| / Lb."""
     target = check_not_negative("target_cd_m2", target_cd_m2)
     behind = positive("background_cd_m2", background_cd_m2)
     return np.abs(target - behind) / behind
@@ -178,7 +178,7 @@ def target_luminance(
     ground_reflectance: ArrayLike = 0.2,
     sky: str = "clear",
 ) -> Any:
-    """Give the mean luminance of a matt painted target, by its aspect to the sun.
+    """Return the mean luminance of a matt painted target, by its aspect to the sun.
 
     The target is taken as a Lambert sphere: its sunlit side is turned to us when the sun is behind
     us, its shaded side when we look towards the sun. With χ the angle between the line of sight
@@ -219,7 +219,7 @@ def background_luminance(
     sky: str = "clear",
     background: str = "auto",
 ) -> Any:
-    """Give the luminance of what lies behind the target, the sky or matt ground."""
+    """Return the luminance of what lies behind the target, the sky or matt ground."""
     if background not in BACKGROUNDS:
         raise ValueError(
             f"background is {background!r}: it must be one of {', '.join(BACKGROUNDS)}"
@@ -246,6 +246,6 @@ def _ground(ground_reflectance: ArrayLike) -> FloatArray:
 
 
 def _ground_luminance(sun_elevation_rad: FloatArray, reflectance: FloatArray, sky: str) -> Any:
-    """Give the luminance of level Lambert ground under sun and sky."""
+    """Return the luminance of level Lambert ground under sun and sky."""
     beam = beam_illuminance(sun_elevation_rad, sky) * np.sin(sun_elevation_rad)
     return reflectance * (beam + sky_illuminance(sun_elevation_rad, sky)) / np.pi

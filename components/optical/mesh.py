@@ -241,7 +241,7 @@ def _edge_x(x: FloatArray, y: FloatArray, low: int, high: int, height: FloatArra
 
 
 def _is_convex(vertices: FloatArray, faces: NDArray[np.int64]) -> bool:
-    """Tell whether all vertices lie on one side of every triangle's plane."""
+    """Return whether all vertices lie on one side of every triangle's plane."""
     used = vertices[np.unique(faces)]
     size = float(np.max(np.ptp(used, axis=0)))
     for start in range(0, len(faces), 256):

@@ -151,7 +151,7 @@ class ElectroOpticalParameters(CameraParameters):
     )
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to daylight, where no background is asked for."""
+        """Return a sentence for each key of daylight, where no background is given."""
         said = super().without_effect()
         if self.background == "none":
             sun = "sun_azimuth_deg", "sun_elevation_deg", "sun_exclusion_deg"

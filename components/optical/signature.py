@@ -31,7 +31,7 @@ def line_of_sight_rate(
     seen_before: ArrayLike = True,
     model: str = "exact",
 ) -> Any:
-    """Give the angular rate of the line of sight between two looks: the dynamic signature V.
+    """Return the angular rate of the line of sight between two looks: the dynamic signature V.
 
     - ``exact``: angle between the two lines of sight / interval (errata 11). No jump where the
       azimuth wraps, none near the zenith.
@@ -167,7 +167,7 @@ def total_signature(
 
 
 def confidence(signature: ArrayLike, threshold: ArrayLike = 1.0) -> Any:
-    """Give the margin of the signature over the threshold, C = E - threshold (thesis eq. 19).
+    """Return the margin of the signature over the threshold, C = E - threshold (thesis eq. 19).
 
     The target is detected when C >= 0 (errata 10). C is in the units of E: weighted pixels.
     """
@@ -185,7 +185,7 @@ def detection_range(
     threshold: ArrayLike = 1.0,
     sensor_pixels: ArrayLike | None = None,
 ) -> Any:
-    """Give the range at which a target is just detected, in closed form.
+    """Return the range at which a target is just detected, in closed form.
 
     R = sqrt(a · area · P / (pixel azimuth · pixel elevation · (threshold - bV))). Infinity where
     the speed alone reaches the threshold. With `sensor_pixels`, 0 where not even an image that
@@ -224,7 +224,7 @@ class DynamicSignature(Effect[CellValues]):
     acts_on = SIGNATURE
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for the weight b."""
+        """Return whether motion adds to the signature: needs the weight b."""
         weight = block.p.dynamic_weight
         return Verdict(weight > 0, f"dynamic_weight is {weight:g}")
 

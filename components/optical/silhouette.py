@@ -122,7 +122,7 @@ def union_area(
     back_m2: FloatArray | None,
     plate_aspect_ratio: float = PLATE_ASPECT_RATIO,
 ) -> FloatArray:
-    """Give the exact silhouette of the union of the three bodies.
+    """Return the exact silhouette of the union of the three bodies.
 
     The bodies are: a capsule along the x axis (cylinder of radius r = sqrt(front/pi) and length
     side/(2 r), closed by half spheres), which is its own convex hull; and a flat rectangle in the
@@ -267,7 +267,7 @@ def visible_area(
     mesh: TriangleMesh | None = None,
     validate: bool = True,
 ) -> Any:
-    """Give the area of a target projected on the plane across the line of sight.
+    """Return the area of a target projected on the plane across the line of sight.
 
     All arrays broadcast together. What is computed, with u the unit vector of the line of sight
     from us to the target in the target's body axes (x nose, y right wing, z down):

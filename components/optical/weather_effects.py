@@ -44,10 +44,12 @@ class Visibility(Effect[CellValues]):
     acts_on = CONTRAST
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``[weather]`` for a visibility, fog or rain."""
+        """Return whether haze reduces contrast: needs visibility, fog or rain in ``[weather]``."""
         weather = block.context.sections["weather"]
         if infrared_band_of(block) is not None:
-            return Verdict(False, f"{_describe_band(block)}: the air takes what it takes there")
+            return Verdict(
+                False, f"{_describe_extinction_band(block)}: the air takes what it takes there"
+            )
         if weather.visibility_km is not None:
             return Verdict(True, f"[weather] visibility_km is {weather.visibility_km:g}")
         found = [
@@ -81,8 +83,8 @@ class BandExtinction(Effect[CellValues]):
     acts_on = CONTRAST
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``extinction_band``."""
-        return Verdict(infrared_band_of(block) is not None, _describe_band(block))
+        """Return whether air attenuates the camera's band: needs ``extinction_band``."""
+        return Verdict(infrared_band_of(block) is not None, _describe_extinction_band(block))
 
     def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's contrast."""
@@ -115,7 +117,7 @@ class ObscuringCells(Effect[CellValues]):
     acts_on = CONTRAST
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask whether a cell comes near."""
+        """Return whether weather cells obscure targets: one must come near."""
         return cells_verdict(block)
 
     def build(self, block: Any) -> CellValues:
@@ -161,7 +163,7 @@ class CellsInTheWay(ObscuringCells):
     acts_on = TRANSMISSION
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask whether a cell comes near, and a search by contrast."""
+        """Return whether cells obscure targets: one must come near, and contrast be searched."""
         if getattr(block.p, "search", "") == "round":
             return Verdict(False, "search is 'round', which no contrast slows")
         return super().verdict(block)
@@ -178,7 +180,7 @@ class Night(Effect[bool]):
     outside_the_proof = "a camera in the dark is off"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``[weather] night``."""
+        """Return whether night hides targets: needs ``[weather] night``."""
         night = block.context.sections["weather"].night
         if night and getattr(block.p, "band", "eo") == "ir":
             return Verdict(False, "band is 'ir': warm areas need no daylight")
@@ -189,7 +191,7 @@ class Night(Effect[bool]):
         return True
 
 
-def _describe_band(block: Any) -> str:
+def _describe_extinction_band(block: Any) -> str:
     return f"extinction_band is {block.p.extinction_band!r}"
 
 

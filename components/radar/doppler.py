@@ -346,6 +346,6 @@ class DopplerFilter(Effect[DopplerProcessing]):
     outside_the_proof = "every filter takes something from a target"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``moving_target_filter``."""
+        """Return whether Doppler filtering is simulated: needs ``moving_target_filter``."""
         kind = block.p.moving_target_filter
         return Verdict(kind != "none", f"moving_target_filter is {kind!r}")

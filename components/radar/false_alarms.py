@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry import Vector, body_to_ned, unit_vector
-from components.messages.detections import REPORT, Detections, Reporting
+from components.messages.detections import REPORT, Detections, ReportTransform
 from components.messages.false_detections import sort_by_measurement
 from components.messages.targets import RelativeTargets
 from components.radar.detection.clutter import clutter_detection_probability
@@ -67,10 +67,10 @@ class NoiseReports:
     ) -> Detections:
         """Return the report with the false alarms of its scans."""
         for which, crossing in enumerate(self._crossings):
-            detections = self._with_alarms(detections, targets, rows, crossing, which)
+            detections = self._add_false_alarms(detections, targets, rows, crossing, which)
         return sort_by_measurement(detections)
 
-    def _with_alarms(
+    def _add_false_alarms(
         self,
         detections: Detections,
         targets: RelativeTargets,
@@ -112,7 +112,7 @@ class NoiseReports:
         )
 
 
-class FalseAlarms(Effect[Reporting]):
+class FalseAlarms(Effect[ReportTransform]):
     """False alarms by scan: Binomial(resolution cells, Pfa), anywhere in the field of view.
 
     Pfa is how often noise crosses the threshold that targets cross, where a look is cued that of
@@ -129,7 +129,7 @@ class FalseAlarms(Effect[Reporting]):
     outside_the_proof = "a report without false alarms is what there is without it"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``false_alarms``, and whether the radar is switched on."""
+        """Return whether false alarms are simulated: needs ``false_alarms``, a radar that is on."""
         if block.p.false_alarms and not block.p.enabled:
             return Verdict(False, "enabled is false")
         return Verdict.of_flag(block.p, "false_alarms")
@@ -203,7 +203,7 @@ class GroundReports:
     ) -> Detections:
         """Return the report with the ground's false alarms of its scans."""
         numbers = zip(rows.tolist(), detections.run.tolist(), detections.scan.tolist(), strict=True)
-        crossed = [self._of_scan(targets, *number) for number in numbers]
+        crossed = [self._find_ground_crossings(targets, *number) for number in numbers]
         counts = [len(cell) for cell, _ in crossed]
         row = np.repeat(np.arange(len(crossed)), counts)
         if len(row) == 0:
@@ -230,7 +230,7 @@ class GroundReports:
         # Without any here, the report is in that order already.
         return sort_by_measurement(joined)
 
-    def _of_scan(
+    def _find_ground_crossings(
         self, targets: RelativeTargets, row: int, run: int, scan: int
     ) -> tuple[IntArray, FloatArray]:
         """Return the cells that the ground crosses the threshold in, and their CNR."""
@@ -264,7 +264,7 @@ class GroundReports:
     def _lit_cells(
         self, own_alt_m: float, elevation_rad: FloatArray
     ) -> Iterator[tuple[int, IntArray, FloatArray]]:
-        """Give each range cell with clutter, the beams that meet it, and where they point."""
+        """Yield each range cell with clutter, the beams that meet it, and their directions."""
         if any(echo.diffuse for echo in self._block.echoes):
             everywhere = np.arange(len(elevation_rad))
             for depth in range(len(self._range_m)):
@@ -303,7 +303,7 @@ class GroundReports:
         return pfa, clutter.total
 
 
-class ClutterAlarms(Effect[Reporting]):
+class ClutterAlarms(Effect[ReportTransform]):
     """Reports of cells in which the ground crosses the threshold that noise does not.
 
     With an adaptive threshold there are none beyond those of noise, whose number it keeps. With
@@ -319,7 +319,7 @@ class ClutterAlarms(Effect[Reporting]):
     outside_the_proof = "a report without the ground is what there is without it"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``false_alarms``, ground, and a threshold that it crosses."""
+        """Return whether clutter causes alarms: needs ``false_alarms``, ground and a threshold."""
         p = block.p
         if not (p.false_alarms and p.enabled):
             return Verdict(False, "false_alarms is false" if p.enabled else "enabled is false")
@@ -341,7 +341,7 @@ NO_FALSE_ALARMS_PER_SCAN = 1e-6
 
 
 def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
-    """Say that a radar detects echoes below its noise, as so many false alarms are allowed."""
+    """Return a warning if the Pfa is so high that echoes below the noise are detected."""
     pfa = parameters.false_alarm_probability
     if pfa < HIGH_FALSE_ALARM_PROBABILITY or not math.isfinite(snr_db):
         return []
@@ -354,7 +354,7 @@ def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
 
 
 def unlikely_false_alarms(block: Any) -> list[str]:
-    """Say how many false alarms a scan has where there are many, or practically none."""
+    """Return a sentence on the number of false alarms, if that is large or practically 0."""
     if not (block.p.false_alarms and block.p.enabled):
         return []
     pfa, cells = block.crossing.false_alarm_probability, cells_of_radar(block).count

@@ -294,7 +294,7 @@ class GroundClutter(Effect[Echo]):
     acts_on = CLUTTER
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``[terrain] height_m``."""
+        """Return whether ground clutter is simulated: needs ``[terrain] height_m``."""
         terrain = terrain_of(block)
         if terrain is None:
             return Verdict(False, "[terrain] height_m is not given")

@@ -79,7 +79,7 @@ class LinkBudget:
 
     @cached_property
     def constant_m2(self) -> float:
-        """What RCS/range⁴ is multiplied with to give the SNR, m².
+        """Return the factor in m² that multiplies RCS/range⁴ to give the SNR.
 
         Pt G² λ² G_I / ((4 pi)³ k T0 F B L) with T0 = 290 K and one antenna for both ways: thesis
         eq. 7 and 8, completed by the coherent integration gain G_I, the noise figure F and the
@@ -223,18 +223,18 @@ _PREFIXES = {1e3: "k", 1e6: "M", 1e9: "G", 1e-3: "m", 1e-6: "µ"}
 
 
 def implausible(parameters: Any) -> list[str]:
-    """Say which values of a link budget no radar has, by their own names."""
+    """Return a warning for each value of a link budget that no radar has, by its key."""
     said = []
     for key, (low, high, unit) in _RANGES.items():
         value = getattr(parameters, key)
         if value is None or low <= value <= high:
             continue
         text = f"{key} is {value:g} {unit}: implausible, radars have {low:g} to {high:g} {unit}"
-        said.append(text + _other_unit(value, low, high, unit))
+        said.append(text + _describe_plausible_unit(value, low, high, unit))
     return said
 
 
-def _other_unit(value: float, low: float, high: float, unit: str) -> str:
+def _describe_plausible_unit(value: float, low: float, high: float, unit: str) -> str:
     """Name a multiple of the unit in which the number would be plausible."""
     if unit == "dB":
         return ""
@@ -258,7 +258,7 @@ def gain_of_beam_db(azimuth_deg: float | None, elevation_deg: float | None) -> f
 
 
 def beam_against_gain(parameters: Any) -> list[str]:
-    """Say that a beam and the antenna's gain contradict each other, where they do by over 3 dB.
+    """Return a warning where beam width and antenna gain contradict each other by over 3 dB.
 
     A gain of 30,000 over the product of the beamwidths in degrees is that of antennas as they are
     built (M. I. Skolnik, Introduction to Radar Systems, 3rd ed., section 9.2, has 26,000; C. A.

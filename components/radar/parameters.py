@@ -135,7 +135,7 @@ class RadarParameters(ResolutionParameters):
     )
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to a filter, or to a circular polarisation, that there is not."""
+        """Return a sentence for each key of a filter or a polarisation that is switched off."""
         said, kind = super().without_effect(), self.moving_target_filter
         because = f"moving_target_filter is '{kind}'"
         if kind != "filter_bank":
@@ -293,7 +293,7 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
     )
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to errors by signal, where there are none."""
+        """Return a sentence for each key on errors by signal, where there are no such errors."""
         said = super().without_effect()
         if self.errors != "signal":
             said += self.idle("angle_measurement", because=f"errors is '{self.errors}'")
@@ -391,7 +391,7 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
 
 
 def moved_threshold(p: LinkBudgetParameters) -> list[str]:
-    """Say what Pd a calibration's range has where the threshold is not the one it was for."""
+    """Return a sentence with Pd at a calibration's range, where the threshold differs."""
     known, stated, now = p.calibrate, p.calibrated_pfa, p.false_alarm_probability
     if known is None or stated == now:
         return []

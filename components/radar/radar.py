@@ -91,7 +91,7 @@ class Radar(SweepingSensor):
         self.doppler: DopplerProcessing | None = None
 
     def setup(self) -> None:
-        """Take what the scene's effects do to the SNR."""
+        """Store the scene's effects on the SNR."""
         self.snr_factors = self.built(SNR)
         self.doppler = self.built_one(DOPPLER)
         self.echoes = self.built(CLUTTER)
@@ -117,14 +117,14 @@ class Radar(SweepingSensor):
         return signal * passed, [power * left for power, left in zip(beside, residues, strict=True)]
 
     def request(self, port: str) -> Any:
-        """Ask for the targets in our reach, and how they go on where rates are of interest."""
+        """Return a request for targets in reach, with their motion where rates are measured."""
         reach = super().request(port)
         if not (self.p.enabled and (self._rates or self.built(DOPPLER))):
             return reach
         return replace(reach, lasts_s=LASTS_S + reach.lasts_s)
 
     def offer(self, port: str) -> Any:
-        """Say beside what every sensor says whether range rates and ranges fold."""
+        """Return the sensor's declaration, with whether range rates and ranges are ambiguous."""
         return replace(
             super().offer(port),
             folds_range_rate=self.p.range_rate_folds,
@@ -198,7 +198,7 @@ class LaterAcquisition(Effect[CellValues]):
     acts_on = SNR
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``acquisition``."""
+        """Return whether targets are acquired after a delay: needs ``acquisition``."""
         if not block.p.acquisition:
             return Verdict(False, "acquisition is not given")
         return Verdict(True, f"acquisition has {len(block.p.acquisition)} ranges")
@@ -309,19 +309,19 @@ class RangeBoundary(Radar):
         self.wavelength_m = None if frequency_hz is None else float(wavelength(frequency_hz))
 
     def setup(self) -> None:
-        """Take what the scene's effects do to the boundary."""
+        """Store the scene's effects that change the range of detection."""
         super().setup()
         refuse_cues(self)
 
     def request(self, port: str) -> Any:
-        """Ask how targets go on too, where their speed decides which are acquired."""
+        """Return a request for targets in reach, with their motion if speed decides acquisition."""
         reach = super().request(port)
         if not (self.p.enabled and len(self.p.acquisition) > 1):
             return reach
         return replace(reach, lasts_s=max(reach.lasts_s, 2.0 * STEP_S))
 
     def warnings(self) -> list[str]:
-        """Say that clutter counts as signal, where it does, and which weather has an effect."""
+        """Return warnings where clutter counts as signal, and on which weather has an effect."""
         return [
             *super().warnings(),
             *clutter_as_signal(self.p, terrain_of(self)),

@@ -139,7 +139,7 @@ class RcsFluctuation(Effect[ModelsOfCells]):
     acts_on = FLUCTUATION
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask the radar's ``swerling``, and where it has none each target's."""
+        """Return whether RCS fluctuates: by the radar's ``swerling``, or else by each target's."""
         if block.p.swerling is not None:
             return Verdict(block.p.swerling not in (0, 5), f"swerling is {block.p.swerling}")
         return _verdict_by_targets(
@@ -160,7 +160,7 @@ class AspectRcs(Effect[CellValues]):
     acts_on = MEAN_RCS
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``aspect_rcs``, and every target for an ``rcs_table``."""
+        """Return whether RCS depends on aspect: needs ``aspect_rcs`` and targets' ``rcs_table``."""
         if not block.p.aspect_rcs:
             return Verdict(False, "aspect_rcs is false")
         return _verdict_by_targets(
@@ -322,7 +322,7 @@ class LastingFluctuation(Effect[Fading]):
     outside_the_proof = "without it every scan draws a fade of its own"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for the two keys, and whether anything fluctuates."""
+        """Return whether fluctuation lasts over scans: needs both keys and a fluctuating target."""
         lasts_s, extent_m = block.p.fluctuation_correlation_s, block.p.scintillation_extent_m
         if lasts_s is None and extent_m is None:
             return Verdict(

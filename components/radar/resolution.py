@@ -105,7 +105,7 @@ class ResolutionParameters(RangeErrorParameters, SensorParameters):
 
     @property
     def reports_by_cell(self) -> bool:
-        """Whether targets of one resolution cell are one report."""
+        """Return whether targets in one resolution cell give one report."""
         if self.resolution_cells is None:
             return self.errors != "grid" and not self.sizeless_steps
         return self.resolution_cells
@@ -232,7 +232,7 @@ class OneReportByCell(Effect[Merging]):
     outside_the_proof = "without it every target has a report of its own"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``resolution_cells``."""
+        """Return whether targets merge into one report a cell: needs ``resolution_cells``."""
         p = block.p
         if p.resolution_cells is None and p.errors != "grid":
             if p.sizeless_steps:
@@ -264,7 +264,7 @@ class RangeFolding(Effect[SeemingRange]):
     outside_the_proof = "without it nothing is seen beyond c / 2PRF"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``range_folds``, and say which PRFs resolve it."""
+        """Return whether ranges fold: needs ``range_folds``; with the PRFs that resolve them."""
         p = block.p
         if not p.range_folds:
             return Verdict(False, "range_folds is false")

@@ -87,7 +87,7 @@ class SwerlingParameters(LinkBudgetParameters):
     )
 
     @model_validator(mode="after")
-    def _covered(self) -> Self:
+    def _check_reference_pd(self) -> Self:
         if self.reference_pd <= self.false_alarm_probability:
             raise ValueError(
                 f"reference_pd is {self.reference_pd:g}: it must be above false_alarm_probability, "
@@ -112,7 +112,7 @@ class SwerlingParameters(LinkBudgetParameters):
         return self
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to a fluctuation that there is not."""
+        """Return a sentence for each key of a fluctuation that is switched off."""
         said = super().without_effect()
         if self.swerling in (0, 5):
             fading = "fluctuation_correlation_s", "scintillation_extent_m"
@@ -138,7 +138,7 @@ class SwerlingParameters(LinkBudgetParameters):
 
     @property
     def samples_rcs(self) -> bool:
-        """Whether each look has an RCS of its own and a steady target's Pd at it."""
+        """Return whether an RCS is drawn for each look, and Pd is that of a steady target."""
         lasting = (self.fluctuation_correlation_s, self.scintillation_extent_m)
         return self.fluctuation == "sampled" or any(given is not None for given in lasting)
 
@@ -173,7 +173,7 @@ class SwerlingRadar(LinkBudgetRadar):
         self._reference_db: dict[int, float] = {}
 
     def setup(self) -> None:
-        """Take the scene's effects; without fluctuation every target is steady."""
+        """Store the scene's effects; without fluctuation every target is steady."""
         super().setup()
         self._models = self.built_one(FLUCTUATION) or steady
         self._fading = self.built_one(FADING)
@@ -181,12 +181,12 @@ class SwerlingRadar(LinkBudgetRadar):
             self._method = self.built_one(PD_METHOD) or "table"
 
     def left_out(self) -> list[str]:
-        """Say which method of Pd was picked, and why, if the scene asks for that."""
+        """Return a sentence on the chosen Pd method and its reason, where the scene has `auto`."""
         said = [*super().left_out(), *noise_at_targets(self.p)]
         return said if self.p.model is None else [*said, *method_reasons(self, self._method)]
 
     def warnings(self) -> list[str]:
-        """Say besides where scans come faster than fades end."""
+        """Return the radar's warnings, and one where scans follow faster than fades end."""
         return [*super().warnings(), *_fades_drawn_too_often(self)]
 
     def range_slack(self) -> float:
@@ -229,12 +229,18 @@ class SwerlingRadar(LinkBudgetRadar):
         pd = np.where(echo, self._pd_of_cells(cells, snr, clutter), 0.0)
         draw = cells.draws(self._draws)
         extras = {"snr_db": snr_db, "detection_probability": pd}
-        noise = draw >= self._of_target(cells, pd, clutter) if self.p.errors == "signal" else None
+        noise = (
+            draw >= self._target_detection_probability(cells, pd, clutter)
+            if self.p.errors == "signal"
+            else None
+        )
         tail = np.clip(draw / np.maximum(pd, 1e-300), 0.0, 1.0)
         cnr = None if clutter is None else clutter.total
         return Look(draw < pd, confidence, extras, signal_over_clutter(snr, cnr), noise, tail)
 
-    def _of_target(self, cells: Cells, pd: FloatArray, clutter: Clutter | None) -> FloatArray:
+    def _target_detection_probability(
+        self, cells: Cells, pd: FloatArray, clutter: Clutter | None
+    ) -> FloatArray:
         """Return the probability that the target is detected where noise alone is not.
 
         As if noise and target were detected independently, Pd = 1 - (1 - Pfa)(1 - this).
@@ -251,7 +257,7 @@ class SwerlingRadar(LinkBudgetRadar):
         rcs = values_of(self, self.mean_rcs_m2, cells)
         keys = cells.roster.keys_of(cells.target)
         for model, chosen in self._models(cells):
-            if self._fading is not None and self._lasts(model):
+            if self._fading is not None and self._is_lasting(model):
                 rcs[chosen] = rcs[chosen] * self._fading(cells, chosen, model)
                 continue
             draws = self._rcs_draws.of_runs(cells.run[chosen], cells.instant_ns[chosen])
@@ -261,8 +267,8 @@ class SwerlingRadar(LinkBudgetRadar):
             )
         return self.echo_snr(cells, rcs)
 
-    def _lasts(self, model: int) -> bool:
-        """Say whether a model's fluctuation lasts: it does not where pulses of a look differ."""
+    def _is_lasting(self, model: int) -> bool:
+        """Return whether a model's fluctuation lasts over a look: not where its pulses differ."""
         return model in (1, 3) or (model in (2, 4) and self.p.pulses_summed == 1)
 
     @property
@@ -387,7 +393,7 @@ _EXTENT_M, _TURNS_RAD_S = 10.0, math.radians(0.2)
 
 
 def _fades_drawn_too_often(block: Any) -> list[str]:
-    """Say where each scan has a fade of its own, and comes before the last one can be over."""
+    """Return a warning where scans draw new fades before the last fade can have ended."""
     effects, p = block.context.effects, block.p
     if not p.enabled or RcsFluctuation.name not in effects or LastingFluctuation.name in effects:
         return []

@@ -119,9 +119,9 @@ class LinkBudgetRadar(Radar):
         self._roster: Roster | None = None
 
     def setup(self) -> None:
-        """Take what the scene's effects do to the SNR, and leave out what it does not call for."""
+        """Store the scene's effects on the SNR."""
         super().setup()
-        self._echo_budget = self._without_blind_range()
+        self._echo_budget = self._far_field_link_budget()
         self.mean_rcs_m2 = self.built_one(MEAN_RCS) or constant_rcs_m2
         self._beam_shape = self.built_one(BEAM_SHAPE)
         self._propagation = self.built_one(PROPAGATION)
@@ -132,9 +132,9 @@ class LinkBudgetRadar(Radar):
             noise.refuse_too_many()
 
     def _set_threshold(self) -> None:
-        """Take the threshold that the scene's effects leave, where that is not known before."""
+        """Set the threshold after the scene's effects, where it is not known before."""
 
-    def _without_blind_range(self) -> Any:
+    def _far_field_link_budget(self) -> Any:
         """Return the link budget that ends where the antenna's far field does."""
         far_field = replace(self.budget, minimum_range_m=None)
         # A minimum range inside the near field is the scene's word that there are echoes.
@@ -187,7 +187,7 @@ class LinkBudgetRadar(Radar):
 
     @property
     def crossing(self) -> Crossing:
-        """How a look crosses the threshold: a target's output and noise alike."""
+        """Return the rule by which outputs of targets and of noise cross the threshold."""
         return Crossing.from_false_alarms(self.p.pulses_summed, self.p.false_alarm_probability)
 
     def cued_crossing(self) -> Crossing | None:
@@ -223,7 +223,7 @@ class LinkBudgetRadar(Radar):
         rate: FloatArray,
         cued: bool | None = None,
     ) -> Detections:
-        """Return a report with threshold crossings without a target, reported as if it were there.
+        """Return detections with reports of noise added at the cells of `row`.
 
         They are given by ascending row of the report, position by quantity in the sensor's axes,
         key of their draws, how strong they came out (linear, above 0), and a uniform number that
@@ -257,7 +257,7 @@ class LinkBudgetRadar(Radar):
         )
 
     def describe_threshold_key(self) -> str:
-        """Say which key sets how often noise crosses the threshold, and its value."""
+        """Return the key that sets the probability of false alarm, and its value."""
         return f"false_alarm_probability is {self.p.false_alarm_probability:g}"
 
     def steepest_pd(self) -> float | None:
@@ -275,7 +275,7 @@ class LinkBudgetRadar(Radar):
         return float(10.0 * np.log10(snr))
 
     def left_out(self) -> list[str]:
-        """Say what the air would take that the scene leaves out, and where echoes are ambiguous."""
+        """Return sentences on attenuation that the scene leaves out, and on ambiguous echoes."""
         said = [*super().left_out(), *gas_left_out(self)]
         if self.p.prf_hz is not None and self.p.range_km is None and not self.p.range_folds:
             range_km = self.stated_reach.range_max_m / 1000.0
@@ -286,7 +286,7 @@ class LinkBudgetRadar(Radar):
         return said
 
     def warnings(self) -> list[str]:
-        """Say which values no radar has, and what its false alarm probability comes to."""
+        """Return a warning for each value that no radar has, and on its false alarm probability."""
         snr_db = self.required_snr_db(0.5, "swerling1")
         return [
             *super().warnings(),
@@ -343,7 +343,7 @@ class ThresholdRadar(LinkBudgetRadar):
 
     @property
     def crossing(self) -> Crossing:
-        """How a look crosses the threshold: noise crosses the one that targets do."""
+        """Return the rule by which noise crosses the threshold that is set for targets."""
         return Crossing.from_snr(self.p.pulses_summed, self.threshold_db)
 
     def cued_crossing(self) -> Crossing | None:
@@ -353,7 +353,7 @@ class ThresholdRadar(LinkBudgetRadar):
         return Crossing.from_snr(self.p.pulses_summed, self.cued_threshold_db)
 
     def describe_threshold_key(self) -> str:
-        """Say which key sets how often noise crosses the threshold, and its value."""
+        """Return the key that sets the probability of false alarm, and its value."""
         given = "" if self.p.threshold_db is not None else " (not given)"
         return f"threshold_db{given} is {self.threshold_db:g}"
 

@@ -39,7 +39,7 @@ class BlindRange(Effect[CellValues]):
     acts_on = SNR
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``minimum_range_m``."""
+        """Return whether near targets are missed: needs ``minimum_range_m``."""
         nearest = block.p.minimum_range_m
         if nearest is None:
             return Verdict(False, "minimum_range_m is not given")
@@ -65,7 +65,7 @@ class Eclipsing(Effect[CellValues]):
     acts_on = SNR
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``pulse_width_s``."""
+        """Return whether transmitted pulses eclipse echoes: needs ``pulse_width_s``."""
         width_s = block.p.pulse_width_s
         if width_s is None:
             return Verdict(False, "pulse_width_s is not given")
@@ -94,7 +94,7 @@ class Multipath(Effect[CellValues]):
     acts_on = PROPAGATION
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``[terrain]`` for a height and a roughness."""
+        """Return whether multipath is simulated: needs ``[terrain]`` height and roughness."""
         terrain = terrain_of(block)
         if terrain is None:
             return Verdict(False, "[terrain] height_m is not given")
@@ -135,7 +135,7 @@ class Attenuation(Effect[CellValues]):
     key: ClassVar[str]
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask the scene's ``[weather]``, and whether the radar's carrier is known."""
+        """Return whether air attenuates echoes: needs ``[weather]`` and the radar's carrier."""
         value = getattr(block.context.sections["weather"], self.key)
         if value and block.wavelength_m is None:
             return Verdict(False, _NO_CARRIER)
@@ -194,7 +194,7 @@ def worst_one_way_db(table: AttenuationTable, reach_m: float) -> float:
 
 
 def weather_without_carrier(block: Any) -> list[str]:
-    """Say that weather does nothing to a radar whose carrier is not known."""
+    """Return a warning that weather has no effect on a radar whose carrier is not known."""
     weather = block.context.sections.get("weather")
     if weather is None or block.wavelength_m is not None or not block.p.enabled:
         return []
@@ -220,7 +220,7 @@ class Gas(Attenuation):
 
 
 def rain_warnings(block: Any) -> list[str]:
-    """Say where rain has no echo, or where its echo is taken for more than it is."""
+    """Return a warning where rain has no echo, or where its echo is overestimated."""
     weather = block.context.sections.get("weather")
     rains = weather is not None and any(c.rain_rate_mm_h for c in (weather, *weather.cells))
     if not rains or not block.p.enabled:
@@ -245,7 +245,7 @@ _RANGE_WITHOUT_ONE_M = 10e3
 
 
 def gas_left_out(block: Any) -> list[str]:
-    """Say what clear air would take from a radar above 10 GHz in a scene without gas.
+    """Return a sentence on clear-air loss of a radar above 10 GHz in a scene without gas.
 
     It is not on by default: a radar calibrated by a range that was measured through air has the air
     in its calibration already, and scenes keep their values.
@@ -310,7 +310,7 @@ class CellsOfWeather(Effect[CellValues]):
     acts_on = SNR
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask whether a cell comes near, and whether the radar's carrier is known."""
+        """Return whether weather cells have an effect: needs one near, and the radar's carrier."""
         if weather_cells(block) and block.wavelength_m is None:
             return Verdict(False, _NO_CARRIER)
         return cells_verdict(block)

@@ -143,7 +143,7 @@ class CuedLooks(Effect[ConesAhead]):
     acts_on = CUE
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for a wire that brings cues."""
+        """Return whether looks follow cues: needs a wire that brings them."""
         sources = _cueing_blocks(block)
         if not sources:
             return Verdict(False, "no wire brings cues")

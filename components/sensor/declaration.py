@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry import body_to_ned, unit_vector
-from components.messages.detections import REPORT, Detections, Reporting
+from components.messages.detections import REPORT, Detections, ReportTransform
 from components.sensor.look import DECLARATION, Cells, Judging, Look
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -28,7 +28,7 @@ def no_looks_yet(n: int, targets: int) -> BoolArray:
 def declare_looks(
     target: IntArray, detected: BoolArray, m: int, n: int, memory: BoolArray
 ) -> tuple[BoolArray, BoolArray]:
-    """Say at which looks (looks,) targets are declared, and what is remembered of them after.
+    """Return at which looks (looks,) targets are declared, and the memory for later looks.
 
     A target is declared at a look if m or more of its last n looks, this one included, detected
     it. Only looks count, each target's in order of time: a scan that did not look at a target
@@ -61,7 +61,7 @@ class DeclarationRule(Effect[Judging]):
     acts_on = DECLARATION
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``declare_m`` and ``declare_n``."""
+        """Return whether detections are declared m of n: needs ``declare_m`` and ``declare_n``."""
         m, n = block.p.declare_m, block.p.declare_n
         if m is None:
             return Verdict(False, "declare_m and declare_n are not given")
@@ -222,7 +222,7 @@ class _Neighbours:
     def pairs(
         self, asked: IntArray, first: IntArray, number: IntArray
     ) -> Iterator[tuple[IntArray, IntArray]]:
-        """Give indices of those asked, and entries of the scan that begins at each one's first."""
+        """Yield indices of the entries asked about, and entries of the scans from `first` on."""
         some = np.flatnonzero(number)
         mine, scan = asked[some], self._scan[first[some]]
         time_s = self._places.time_s[mine]
@@ -243,7 +243,7 @@ class _Neighbours:
 def _is_same_place(
     places: SeenPlaces, one: IntArray, other: IntArray, speed_m_s: float, rate_rad_s: float
 ) -> BoolArray:
-    """Say which pairs of entries have one position."""
+    """Return which pairs of entries have one position."""
     apart_s = np.abs(places.time_s[one] - places.time_s[other])
     variance = np.nan_to_num(places.range_variance_m2)
     gate_m = speed_m_s * apart_s + GATE_DEVIATIONS * np.sqrt(variance[one] + variance[other])
@@ -333,7 +333,7 @@ class DeclaredPlaces:
         return self._first
 
 
-class DeclarationByPlace(Effect[Reporting]):
+class DeclarationByPlace(Effect[ReportTransform]):
     """Marks detections whose position had others in m of the last n scans, targets or false alarms.
 
     Nothing but measured values decides; places are compared in north-east-down by what the
@@ -346,7 +346,7 @@ class DeclarationByPlace(Effect[Reporting]):
     outside_the_proof = "without it whatever is reported is declared"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``declare_m``, ``declare_n`` and ``declare_by``."""
+        """Return whether detections are declared by place: needs ``declare_by = "place"``."""
         p = block.p
         if p.declare_m is None:
             return Verdict(False, "declare_m and declare_n are not given")

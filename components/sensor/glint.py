@@ -133,7 +133,7 @@ class Glint(Effect[Wander]):
     outside_the_proof = "every target has an extent"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``errors`` and ``glint_share``."""
+        """Return whether glint is simulated: needs ``errors`` and ``glint_share``."""
         share = getattr(block.p, "glint_share", None)
         if share is None:
             return Verdict(False, "its errors do not follow from signals")

@@ -142,7 +142,7 @@ def _nearest_countable(size: FloatArray, step: float) -> FloatArray:
 
 
 def _rounds_up(whole: Any, rest: Any, steps: Any) -> Any:
-    """Say where the next grid point is nearer; half-way it is the even one."""
+    """Return where the next grid point is nearer; half-way it is the even one."""
     # rest and steps - rest are compared without rounding: below half a step rest is subtracted
     # from the larger, above it the subtraction is exact (Sterbenz).
     other = steps - rest

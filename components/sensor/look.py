@@ -211,7 +211,7 @@ class Cells:
 
     @cached_property
     def craft(self) -> IntArray:
-        """Which of the roster's aircraft each cell's target is."""
+        """Return the index in the roster of each cell's target."""
         roster = self.roster
         return self.target if roster.is_shared else roster.craft(self.target, self.run)
 

@@ -124,7 +124,7 @@ class ErrorModel:
         run: IntArray,
         instant_ns: IntArray,
     ) -> Values:
-        """Put what noise made anywhere in the target's cell, which says no more of the target.
+        """Return values drawn anywhere in the target's cell, where noise caused the detection.
 
         It errs from there, and states of itself, what any report as strong does: noise does not
         say that it is noise.
@@ -222,7 +222,7 @@ class MeasurementErrors(Effect[ErrorModel]):
     outside_the_proof = "without it reports are the truth on a grid"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``errors``."""
+        """Return whether measurements have errors: needs ``errors``."""
         if block.p.errors == "grid":
             return Verdict(False, "errors is 'grid': values are rounded to the grid")
         return Verdict(True, f"errors is '{block.p.errors}'")

@@ -39,7 +39,7 @@ class Measuring(Component):
 
     @cached_property
     def _measurement(self) -> ErrorModel | SensorGrid:
-        """What gives measured values and their variances: with errors, or on the grid alone."""
+        """Return the model of measured values and variances: with errors, or on the grid alone."""
         return self.built_one(MEASUREMENT) or self.grid
 
     @cached_property

@@ -128,7 +128,7 @@ class Mounting(Effect[SensorAxes]):
     outside_the_proof = "rotating by an angle of 0 and back rounds the last bits"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``mount_*_deg`` and ``misalignment_deg``."""
+        """Return whether mounting angles matter: needs ``mount_*_deg``, ``misalignment_deg``."""
         p = block.p
         turned = [f"{key} is {getattr(p, key):g}" for key in _MOUNT_KEYS if getattr(p, key)]
         if any(p.misalignment_deg):

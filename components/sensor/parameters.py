@@ -112,7 +112,7 @@ class ErrorParameters(ClockedParameters):
         return self
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to errors that there are not."""
+        """Return a sentence for each key of errors that are switched off."""
         said = super().without_effect()
         if self.errors == "grid":
             return said + self.idle("quantised", "biases", because="errors is 'grid'")
@@ -179,7 +179,7 @@ class GlintParameters(ErrorParameters):
     )
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to a wander that there is not."""
+        """Return a sentence for each key of a glint that is switched off."""
         said = super().without_effect()
         if self.errors != "signal":
             return said + self.idle(
@@ -307,7 +307,7 @@ class SensorParameters(ErrorParameters):
         return self
 
     def without_effect(self) -> list[str]:
-        """Say which keys belong to a rule of declaration that there is not."""
+        """Return a sentence for each key of a declaration rule that is switched off."""
         said, places = super().without_effect(), ("declare_speed_m_s", "declare_rate_deg_s")
         if self.declare_m is None:
             return said + self.idle("declare_by", *places, because="declare_m is not given")
@@ -317,7 +317,7 @@ class SensorParameters(ErrorParameters):
 
     @property
     def declares_by(self) -> Literal["target", "place"]:
-        """What detections are counted of."""
+        """Return whether detections are counted by target or by place."""
         if self.declare_by is not None:
             return self.declare_by
         # Radars and cameras that can have false alarms say so by these.

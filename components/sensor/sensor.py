@@ -18,7 +18,7 @@ from components.messages.detections import (
     REPORT,
     Detections,
     LastingError,
-    Reporting,
+    ReportTransform,
     SensorOffer,
     promises_of_looks,
 )
@@ -154,7 +154,7 @@ class Sensor(Measuring):
         self._idle_run = -1
 
     def request(self, port: str) -> Any:
-        """Ask the block that feeds us for the targets in our reach."""
+        """Return a request for the targets in the sensor's reach."""
         slack, because = self.range_slack(), self.exact_because()
         return replace(self._reach_from_body, range_slack=slack, exact_because=because)
 
@@ -166,11 +166,11 @@ class Sensor(Measuring):
         return math.inf
 
     def exact_because(self) -> str:
-        """Say why only an exact line of sight will do, or nothing."""
+        """Return why only an exact line of sight will do, or an empty string."""
         return ""
 
     def offer(self, port: str) -> Any:
-        """Say whether we measure range, and how finely we measure angles."""
+        """Return what this sensor measures and how finely: ranges, angles and their variances."""
         resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
         constant: dict[str, Any] = constant_variances(self.p, self.steps)
         lasting = lasting_errors(self.p, self.steps)
@@ -204,13 +204,13 @@ class Sensor(Measuring):
 
     @cached_property
     def _message(self) -> type[Detections]:
-        """What is sent: `Detections`, or a subclass that declares columns of its own."""
+        """Return the class of sent messages: `Detections`, or a subclass with more columns."""
         message: type[Detections] = type(self).outputs["detections"].message  # type: ignore[assignment]
         return message
 
     @cached_property
     def _is_asked_for_looks(self) -> bool:
-        """Whether the scene asks for every look."""
+        """Return whether the scene records every look."""
         record = self.context.sections.get("record")
         return bool(record is not None and record.looks)
 
@@ -223,7 +223,7 @@ class Sensor(Measuring):
         return self.built(DECLARATION)
 
     @cached_property
-    def _cueing(self) -> ConesAhead | None:
+    def _cue_cones(self) -> ConesAhead | None:
         return self.built_one(CUE)
 
     @cached_property
@@ -231,7 +231,7 @@ class Sensor(Measuring):
         return self.built(STRENGTH)
 
     @cached_property
-    def _reporting(self) -> list[Reporting]:
+    def _report_transforms(self) -> list[ReportTransform]:
         return self.built(REPORT)
 
     def see_targets(
@@ -257,7 +257,7 @@ class Sensor(Measuring):
         held = wake.held("targets")
         if held is None:
             return None
-        cued = None if self._cueing is None else self._cueing(*held, wake)
+        cued = None if self._cue_cones is None else self._cue_cones(*held, wake)
         targets, rows = self.see_targets(*held, cued)
         cells, reason = self.cells(targets, rows, wake)
         if cued is not None:
@@ -315,15 +315,15 @@ class Sensor(Measuring):
             looks=looks_of(cells, decided, len(wake)) if self._is_asked_for_looks else None,
         )
         detections.row_of_entries = row
-        for report in self._reporting:
+        for report in self._report_transforms:
             detections = report(detections, targets, rows)
-        if self._cueing is not None:
-            detections = self._cueing.with_noise(detections)
+        if self._cue_cones is not None:
+            detections = self._cue_cones.with_noise(detections)
         return detections
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return what is recorded of each cell beside its detection."""
-        if self._cueing is None:
+        if self._cue_cones is None:
             return look.extras
         return {**look.extras, "cued": cells.is_cued()}
 
@@ -338,7 +338,7 @@ class Sensor(Measuring):
 
     def undone(self) -> dict[str, IntArray]:
         """Return how often the cues that it had were too old."""
-        return {} if self._cueing is None else self._cueing.undone()
+        return {} if self._cue_cones is None else self._cue_cones.undone()
 
     def report(self) -> dict[str, Any]:
         """Return when each target was first declared, if the sensor has a rule for it."""

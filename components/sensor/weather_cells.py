@@ -25,7 +25,7 @@ def weather_cells(block: Any) -> tuple[WeatherCell, ...]:
 
 
 def cells_verdict(block: Any) -> Verdict:
-    """Say whether a cell comes near any line of sight of a sensor, as far as can be known."""
+    """Return whether a cell may come near any line of sight of a sensor."""
     cells = weather_cells(block)
     if not cells:
         return Verdict(False, "[weather] has no cells")

@@ -17,7 +17,7 @@ import numpy as np
 
 
 def require_stone_soup(what: str) -> None:
-    """Say how to install the extra if it is missing."""
+    """Raise `UsageError` with how to install Stone Soup if it is missing."""
     try:
         import_module("stonesoup")
     except ImportError as error:
@@ -34,7 +34,7 @@ class Repeatable:
 
     @contextmanager
     def working(self) -> Iterator[None]:
-        """Let Stone Soup work meanwhile; afterwards all is as it was for others."""
+        """Restore global random state after Stone Soup's work in this context."""
         from stonesoup.base import Base
 
         numbers = self._numbers

@@ -110,7 +110,7 @@ class StoneSoupTracker(Component):
         self._tracker = self._build_tracker()
 
     def warnings(self) -> list[str]:
-        """Say whose errors last from look to look, which Stone Soup takes for new ones."""
+        """Return a warning for each sensor with lasting errors, which Stone Soup takes for new."""
         offers = sensor_offers(self.context.producers)
         said = unknown_latency(offers) + folded_ranges(offers)
         for name, offer in sorted(offers.items()):
@@ -152,7 +152,7 @@ class StoneSoupTracker(Component):
         return ACTS_EVERY_S
 
     def run(self, wake: Wake) -> StateTracks | None:
-        """Hand over what came, look by look, and what did not; report all tracks."""
+        """Process looks that came and looks that are missing, in order; return all tracks."""
         due = self._due(wake)
         entries: list[tuple[int, FloatArray, Followed]] = []
         rows: list[int] = []
@@ -205,7 +205,7 @@ class StoneSoupTracker(Component):
         return bool(self._follower) and self._ahead is None and quiet >= self._quiet_ticks
 
     def _process_look(self, look: Scans, pose: SensorPose, wake: Wake) -> "list[Followed]":
-        """Hand one look over, and return the tracks after it."""
+        """Pass one look to Stone Soup, and return the tracks after it."""
         from components.stone_soup.objects import Poses, detections, instant
 
         (tick,) = look.tick.tolist()
@@ -221,7 +221,7 @@ class StoneSoupTracker(Component):
         return self._process_instant(tick, wake, result)
 
     def _process_instant(self, tick: int, wake: Wake, found: "set[Any]") -> "list[Followed]":
-        """Hand over what was detected at an instant, and return the tracks after it."""
+        """Pass the detections of one instant to Stone Soup, and return the tracks after it."""
         from components.stone_soup.objects import instant
 
         time_s = tick / wake.ticks_per_s

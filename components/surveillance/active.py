@@ -181,7 +181,7 @@ class Active(CooperativeSensor):
         self._errs = parameters.measurement != "exact"
 
     def offer(self, port: str) -> Any:
-        """Say that variances differ from answer to answer, and what of the range's lasts."""
+        """Return the sensor's declaration: variances differ by answer, and range errors last."""
         offer: SensorOffer = super().offer(port)
         period_s, every = float(1 / self.p.scan_rate_hz), self.p.far_every
         # The delay of a transponder and the error of an altimeter stay; of a range what is stated
@@ -223,7 +223,7 @@ class Active(CooperativeSensor):
         return np.where(within & (mode_s | mode_c), in_1_s, 0.0)
 
     def look(self, cells: Cells) -> Look:
-        """Ask, and take what is answered."""
+        """Interrogate the targets of the cells, and return the answers as a look."""
         probability = self.answer_probability(cells)
         detected = probability > 0.0
         asked = np.flatnonzero(detected)

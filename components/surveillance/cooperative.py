@@ -41,7 +41,7 @@ _MEASURED_KEYS = (
 )  # fmt: skip
 
 
-def _as_read(value: Any) -> Any:
+def _tuple_if_list(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -77,13 +77,13 @@ class CooperativeParameters(SensorParameters):
                 f"{key} is given: a cooperative sensor has no axes and no grid of its own; "
                 "leave it out"
                 for key in _MEASURED_KEYS
-                if key in given and _as_read(given[key]) != fields[key].default
+                if key in given and _tuple_if_list(given[key]) != fields[key].default
             ]
         )
         return given
 
     def without_effect(self) -> list[str]:
-        """Say nothing of the keys that may not be given."""
+        """Return a sentence for each key without effect, except keys that may not be given."""
         return [said for said in super().without_effect() if not said.startswith(_MEASURED_KEYS)]
 
 
@@ -100,7 +100,7 @@ class CooperativeSensor(Sensor):
     hears_of: ClassVar[tuple[str, ...]] = ()
 
     def request(self, port: str) -> Any:
-        """Ask for the flights too: messages are sent at instants of their own."""
+        """Return a request for targets with flights: messages are sent between scans."""
         reach = super().request(port)
         return replace(reach, lasts_s=4.0 * STEP_S) if self.p.enabled else reach
 
@@ -123,7 +123,7 @@ class CooperativeSensor(Sensor):
         return altitude_m - (own_m - cells.own_belief("alt_m")[which])
 
     def _note_pressure_heights(self) -> list[str]:
-        """Say by how much pressure altitudes are off where they are taken for heights."""
+        """Return a sentence on the error of pressure altitudes that are used as heights."""
         if self._air is None or self.p.heights == "geometric":
             return []
         at_m = np.array([0.0, 1000.0, 1300.0, 3000.0])
@@ -141,7 +141,7 @@ class CooperativeSensor(Sensor):
         ]
 
     def warnings(self) -> list[str]:
-        """Note targets without the equipment to be received, and which heights are compared."""
+        """Return warnings on targets without equipment, and on which heights are compared."""
         rosters = known_targets(self.context)
         heard = [getattr(one.equipage, name).any() for one in rosters for name in self.hears_of]
         said = [*super().warnings(), *self._note_pressure_heights()]

@@ -52,7 +52,7 @@ class PositionExchange(Component):
     rewindable = True
 
     def request(self, port: str) -> FarthestLook:
-        """Ask for all, and for their flights, which velocities are of."""
+        """Return a request for all targets with their flights, for velocities."""
         return FarthestLook(math.inf, lasts_s=_STEP_S)
 
     def setup(self) -> None:
@@ -73,7 +73,7 @@ class PositionExchange(Component):
         return ["nobody else flies: it hears of nobody"] if alone else []
 
     def run(self, wake: Wake) -> AlertLevels | None:
-        """Give all fixes of every scan, relative to one's own."""
+        """Return the fixes of all targets at every scan, relative to the own fix."""
         states: TrafficStates | None = wake["states"]
         if states is None:
             return None

@@ -57,7 +57,7 @@ def bent_elevation_rad(elevation_rad: Any, range_m: Any, refraction: str = "four
 
 
 def dip_rad(height_m: Any, refraction: str = "none") -> Any:
-    """Return how far the horizon lies below the horizontal (rad, 0 or more), from a height (m).
+    """Return the angle (rad, 0 or more) of the horizon below the horizontal at a height (m).
 
     acos(R' / (R' + h)) over a sphere of radius R' = R / (1 - share): 1.01° from 1000 m with
     straight rays, 0.88° with those of the 4/3 Earth; 0 from below the surface.
@@ -180,7 +180,7 @@ _POINTS_AT_ONCE = 1 << 17
 def is_behind_limb(
     own: Vector, other: Vector, *, surface_m: float = 0.0, refraction: str = "none"
 ) -> BoolArray:
-    """Tell which rays dip below a surface of one height above the ellipsoid (m; 0 for the sea).
+    """Return which rays dip below a surface of constant ellipsoidal height (m; 0 for the sea).
 
     Both ends are three (n,) arrays: latitude (deg), longitude (deg), altitude (m). One below the
     surface is hidden from everywhere.
@@ -197,7 +197,7 @@ def is_behind_terrain(
     offset_m: float = 0.0,
     refraction: str = "none",
 ) -> BoolArray:
-    """Tell which rays run through the ground of a raster.
+    """Return which rays run through the ground of a raster.
 
     The ray's height over the ellipsoid is compared with the bilinear ground under it at points
     half a node's spacing apart, the ends left out. Beside the raster no ground is known, and

@@ -25,7 +25,7 @@ GREY = "#777777"
 
 
 def legend_below(axes: Any, columns: int = 4, *, without: str = "") -> None:
-    """Put the legend of one of a figure's axes below all of them; `without` names an entry."""
+    """Draw the legend of one pair of axes below all of them; `without` names an entry."""
     entries = zip(*axes.get_legend_handles_labels(), strict=True)
     shown = [entry for entry in entries if entry[1] != without]
     axes.figure.legend(*zip(*shown, strict=True), loc="outside lower center", ncols=columns)
@@ -41,7 +41,7 @@ def panels(
     height_in: float = HEIGHT_IN,
     **shared: Any,
 ) -> Iterator[list[Any]]:
-    """Give the axes of a figure, row by row, and write it as PNG when the block is done."""
+    """Yield the axes of a figure, row by row, and write it as PNG when the block is done."""
     with drawing(width_in, height_in, path) as figure:
         figure.set_layout_engine("constrained")
         axes = list(figure.subplots(rows, columns, squeeze=False, **shared).flat)

@@ -71,7 +71,7 @@ class Row:
 
     @property
     def has_value(self) -> bool:
-        """Whether we have a number at all."""
+        """Return whether there is a simulated number."""
         return math.isfinite(self.ours)
 
     @property
@@ -91,7 +91,7 @@ class Row:
 
     @property
     def is_near(self) -> bool:
-        """Whether our number and the printed one are within what is allowed for."""
+        """Return whether the simulated number is within tolerance of the printed one."""
         difference = self.difference
         # The last bits of a subtraction must not tip a number that lies on the edge.
         return difference is not None and abs(difference) <= self.allowed_difference * (1.0 + 1e-9)
@@ -133,13 +133,13 @@ class Row:
 
     @property
     def predicts(self) -> bool:
-        """Whether this row, and no other before it, predicts a printed number."""
+        """Return whether this row is the first that predicts its printed number."""
         predicted = self.basis is not None and self.basis.kind == PREDICTED
         return predicted and self.printed is not None and not self.again
 
     @property
     def counts(self) -> bool:
-        """Whether it is a prediction that agrees, and no other row's."""
+        """Return whether the row is a prediction that agrees, and no other row's."""
         return self.predicts and self.verdict == PREDICTED
 
     def as_dict(self, item: str) -> dict[str, Any]:

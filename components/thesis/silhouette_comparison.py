@@ -188,7 +188,7 @@ _CLEARLY = 1.25
 
 
 def turned_table_warning(areas: Mapping[str, float], table: SilhouetteTable) -> str | None:
-    """Say that a table looks turned by 90°, or return None.
+    """Return a warning if a table looks turned by 90°, or None.
 
     A fuselage shows more abeam than from the nose. Where the three bodies say so by more than a
     quarter and the table says the opposite by as much, its azimuths most likely count from a wing.

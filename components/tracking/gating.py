@@ -45,7 +45,7 @@ class GatedPairs:
 
     @property
     def measures_range(self) -> bool:
-        """Whether the detections have a range."""
+        """Return whether the detections have a range."""
         return self.kind.has_range or self.ranges is not None
 
 

@@ -53,12 +53,12 @@ class Plan:
 
     @property
     def reports(self) -> BoolArray:
-        """Whether tracks are reported after each: it is the last work that a row brings."""
+        """Return whether tracks are reported after each step: the last one of a row."""
         return np.append(self.row[1:] != self.row[:-1], True)[: len(self.row)]
 
     @property
     def begins(self) -> BoolArray:
-        """Whether each is the first of several works that a row brings."""
+        """Return whether each step is the first of several that a row causes."""
         return np.append(True, self.row[1:] != self.row[:-1])[: len(self.row)] & ~self.reports
 
 

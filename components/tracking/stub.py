@@ -59,7 +59,7 @@ class TrackerStub(Component):
     rewindable = True
 
     def request(self, port: str) -> str:
-        """Ask for what is held: the pose is not."""
+        """Return a request for the held measurements, without the pose."""
         return WITHOUT_POSE
 
     def records(self) -> list[type[Message]]:
@@ -76,7 +76,7 @@ class TrackerStub(Component):
         self._tries = Tries()
 
     def offer(self, port: str) -> Any:
-        """Say which sensors measure range, of what they say of themselves."""
+        """Return the sensors' declarations, with which of them measure range."""
         return {
             name: SensorOffer(one.measures_range, 0.0) if isinstance(one, SensorOffer) else None
             for name, one in sensor_offers(self.context.producers).items()
@@ -91,12 +91,12 @@ class TrackerStub(Component):
         return None if self.p.drop_after_s is None else _ACTS_EVERY_S
 
     def warnings(self) -> list[str]:
-        """Say whose measurements lie behind their targets."""
+        """Return a warning for each sensor whose measurements lag behind their targets."""
         offers = sensor_offers(self.context.producers)
         return super().warnings() + unknown_latency(offers) + folded_ranges(offers)
 
     def run(self, wake: Wake) -> Tracks | None:
-        """Take in new measurements and report what is held."""
+        """Process new measurements, and return the held tracks."""
         fused, counts = self._measured_entries(wake)
         if fused is None:
             return None

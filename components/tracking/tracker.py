@@ -155,7 +155,7 @@ class Tracker(Component):
         return max(Fraction(1), latest_s(sensor_offers(producers), producers))
 
     def warnings(self) -> list[str]:
-        """Say whose looks will be left out as too late, and how many."""
+        """Return a warning for each sensor whose looks come too late, with their number."""
         lag_s, why = self._lag_s(), f"lag_s is {float(self._lag_s()):g}"
         if self.p.late == "drop":
             lag_s, why = Fraction(0), "late is 'drop'"
@@ -174,7 +174,7 @@ class Tracker(Component):
         return super().warnings() + result + coarse_bearings(offers) + folded_ranges(offers)
 
     def offer(self, port: str) -> Any:
-        """Hand on what the sensors say of themselves; with ranges where directions give them."""
+        """Return the sensors' declarations, with ranges where directions give them."""
         offers = sensor_offers(self.context.producers)
         if self.p.passive_range_share is None:
             return offers
@@ -190,7 +190,7 @@ class Tracker(Component):
         )
 
     def left_out(self) -> list[str]:
-        """Say whose range rates are not used, and why."""
+        """Return a sentence for each sensor whose range rates are not used, with the reason."""
         offers = sensor_offers(self.context.producers)
         return [
             f"range rates of {name}: {why}"
@@ -204,7 +204,7 @@ class Tracker(Component):
         return TrackStore.empty_of_models([model.size for model in self._estimator.models], sensors)
 
     def run(self, wake: Wake) -> StateTracks | None:
-        """Take in what came, look by look, end what fell silent, and report all tracks."""
+        """Process looks by time, delete tracks without detections, and return all tracks."""
         busy = wake.without_idle()
         reported, worked = list[TrackStore](), _NO_ROWS
         if busy is not None:
@@ -323,7 +323,7 @@ class Tracker(Component):
         return reported, rows
 
     def _note(self, came: Scans, reported: list[TrackStore]) -> None:
-        """Note in which runs something was detected, and a track confirmed."""
+        """Record in which runs a detection came, and in which a track was confirmed."""
         detected = came.run[np.diff(came.offsets) > 0]
         self._tries = self._tries.add_tries(
             detected, np.ones_like(detected), np.zeros(len(detected), dtype=bool)

@@ -19,7 +19,7 @@ class Heights(Parameters):
     )
 
     def height_m(self, air: Air | None, altitude_m: Any) -> Any:
-        """Return altitudes as heights above the ellipsoid, in a scene's air.
+        """Return heights above the ellipsoid, m, of altitudes in a scene's air (None: standard).
 
         None is the standard's, in which they are the same numbers.
         """

@@ -105,7 +105,7 @@ def _velocities(craft: SampledTrajectory) -> FloatArray:
 
 
 def _coverage(own: Trajectory, others: Sequence[SampledTrajectory], duration_s: float) -> list[str]:
-    """Say which aircraft are there for only a part of the run."""
+    """Return a sentence for each aircraft that is present for only a part of the run."""
     lines = []
     first, last = own.interval_present()
     shared = max(0.0, min(last, duration_s) - max(first, 0.0))
@@ -190,7 +190,7 @@ class RecordedTraffic(TrafficSource):
             self.roster = Roster.from_pairs(list(zip(names, shared, strict=True)), own)
 
     def _let_ownship_be(self, own: Ownship | None) -> None:
-        """Take what a scene says of its ownship, where it says it."""
+        """Set the ownship's properties from the scene, where it gives any."""
         if own is not None:
             self.roster = replace(self.roster, own_name=own.name, own_aircraft=(own,))
 
@@ -217,7 +217,7 @@ class RecordedTraffic(TrafficSource):
         return replace(content, ownship=own, intruders=intruders)
 
     def _says_heights(self) -> list[str]:
-        """Say that a file's altitudes are pressure altitudes, in air that is not the standard's."""
+        """Return a warning if a file has pressure altitudes and the air is not standard."""
         is_pressure = re.search("baro|pressure", self.content.height, re.IGNORECASE)
         if self.air is None or not is_pressure or self.p.heights != "geometric":
             return []
@@ -253,7 +253,7 @@ class RecordedTraffic(TrafficSource):
         return times
 
     def warnings(self) -> list[str]:
-        """Say what was left out, what no aircraft does, and which error of units it looks like."""
+        """Return warnings on rows left out, on impossible motion, and on the likely wrong unit."""
         duration_s = float(self.context.duration_s)
         lines = [
             *self.content.warnings, *self._says_heights(), *suspicions(self.content.aircraft),

@@ -326,7 +326,7 @@ def _start_positions(crafts: Sequence[Intruder], references: FloatArray) -> Floa
 
 
 def _straight(crafts: Sequence[Flight], starts: FloatArray, wind: Wind | None) -> ScriptedFleet:
-    """Return flights without legs from where they start (n, 3)."""
+    """Return straight flights from start positions (n, 3)."""
     lat_deg, lon_deg, alt_m = starts.T.copy()
 
     def column(name: str, default: float = 0.0) -> FloatArray:

@@ -142,7 +142,7 @@ class TrafficSource(Component):
         return [self.targets[viewer], *(of for _, of in sorted({**others, viewer: own}.items()))]
 
     def offer(self, port: str) -> KnownTraffic:
-        """Say what the targets are, and where they can be; to all blocks the same.
+        """Return the targets and where they can be, the same for all consumers.
 
         Who went by where targets can be must show as replicas compare it.
         """
@@ -198,7 +198,7 @@ class TrafficSource(Component):
         return FlownFlights.of(fleet_of([self.own]), self.targets, platforms)
 
     def _fly(self, flights: FlownFlights, roster: Roster, parameters: Sequence[Any]) -> None:
-        """Take the flights of all runs, of which this one is the first, and how they publish."""
+        """Store the flights of all runs from this one on, and how they are published."""
         self.roster = roster
         rates = [p.update_rate_hz for p in parameters]
         rates_hz = None if None in rates else np.array(rates, dtype=np.float64)
@@ -276,7 +276,7 @@ class TrafficSource(Component):
         return min(most, len(self.roster))
 
     def left_out(self) -> list[str]:
-        """Say how far targets matter."""
+        """Return a sentence on the range beyond which targets are left out."""
         return [view.left_out(self.roster.names) for view in self._views if view.culls]
 
     def run(self, wake: Wake) -> Message | None:
@@ -308,7 +308,7 @@ class TrafficSource(Component):
         )
 
     def _steer(self, wake: Wake, run: IntArray) -> IntArray:
-        """Let platforms fly what has come; return how many manoeuvres of each every row knows."""
+        """Steer platforms by the manoeuvres that came; return the number known to each row."""
         self._pending = Coming.concatenate([self._pending, *arrived_manoeuvres(wake, self._steers)])
         flown = self._flown
         fleet, runs = flown.fleet, flown.runs
@@ -396,7 +396,7 @@ class TrafficSource(Component):
 
     @property
     def _seeks_at_samples(self) -> bool:
-        """Whether a scene says at which spacing closest approaches are sought."""
+        """Return whether the scene sets the spacing at which closest approaches are sought."""
         return hasattr(self.p, "sample_interval_s")
 
     def _compared_at(self, end_s: float) -> list[SampleTimes]:

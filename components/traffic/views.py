@@ -53,11 +53,11 @@ class View:
 
     @property
     def culls(self) -> bool:
-        """Whether any target may be left out."""
+        """Return whether any target may be left out."""
         return self.intervals is not None or self.epochs is not None
 
     def left_out(self, names: Sequence[str]) -> str:
-        """Say how far targets of these names matter."""
+        """Return a sentence on the range beyond which targets of these names are left out."""
         whose = "" if self.viewer < 0 else f" on {names[self.viewer]}"
         return (
             f"targets beyond {self.reach_m[0] / 1000.0:.2f} km: not moved, no sensor{whose} looks "

@@ -57,7 +57,7 @@ class CrabAngles(Effect[Crabbing]):
     outside_the_proof = "angles are formed anew, and their last bits differ"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``[weather] wind_mps``."""
+        """Return whether wind turns aircraft off their track: needs ``[weather] wind_mps``."""
         weather = block.context.sections.get("weather")
         wind_mps = 0.0 if weather is None else weather.wind_mps
         return Verdict(wind_mps > 0.0, f"[weather] wind_mps is {wind_mps:g}")

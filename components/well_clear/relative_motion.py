@@ -21,7 +21,7 @@ _CLOSE = DOUBLES_APART * 2.0**-52
 def nearly_equal(
     first: Any, second: Any, doubles_apart: int = DOUBLES_APART, tiny: float = TINY
 ) -> BoolArray:
-    """Tell whether numbers are equal up to rounding; infinities of one sign are.
+    """Return whether numbers are equal up to rounding; infinities of one sign are.
 
     At most `doubles_apart` steps from one double to the next lie between them, or both are below
     `tiny` where one of them is 0.
@@ -37,7 +37,7 @@ def nearly_equal(
 
 
 def is_surely_less(first: Any, second: Any) -> BoolArray:
-    """Tell whether one number lies below another, and not only by rounding."""
+    """Return whether the first number is less than the second by more than rounding."""
     first, second = np.asarray(first), np.asarray(second)
     less = np.asarray(first < second)
     with np.errstate(invalid="ignore"):  # of infinities of one sign, neither is less
@@ -50,7 +50,7 @@ def is_surely_less(first: Any, second: Any) -> BoolArray:
 
 
 def nearly_zero(values: FloatArray) -> BoolArray:
-    """Tell whether numbers are zero up to rounding."""
+    """Return whether numbers are zero up to rounding."""
     return np.asarray(np.abs(values) < TINY)
 
 
@@ -180,7 +180,7 @@ def time_to_entry_s(motion: Horizontal, distance_m: float) -> FloatArray:
 def meets_within_time(
     motion: Horizontal, distance_m: float, time_s: float, time_variable: str
 ) -> BoolArray:
-    """Tell whether the flight passes within a distance and its time variable is short enough.
+    """Return whether the flight passes within a distance while its time variable is small.
 
     It is one of `components.well_clear.volume.TIME_VARIABLES`; "none" is never short.
     """

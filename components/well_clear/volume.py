@@ -131,7 +131,7 @@ Relative = Sequence[Any]
 
 
 def violates(volume: Volume, relative: Relative) -> BoolArray:
-    """Tell whether pairs of aircraft violate a volume now.
+    """Return whether pairs of aircraft violate a volume now.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def _arrays(relative: Relative) -> list[FloatArray]:
 def is_inside_cylinder(
     distance_m: FloatArray, height_m: FloatArray, horizontal_m: float, vertical_m: float
 ) -> BoolArray:
-    """Tell whether aircraft are within a cylinder now, its boundary left out."""
+    """Return whether aircraft are within a cylinder now, its boundary excluded."""
     return np.asarray((distance_m < horizontal_m) & (np.abs(height_m) < vertical_m))
 
 

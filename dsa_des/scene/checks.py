@@ -324,7 +324,9 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
                 cls = classes[name] = cls.class_for(parameters)
             options = BlockOptions.model_validate(extra)
         except ValidationError as error:
-            scene_file.problems += explain(scene_file, key, str(type_name), cls.Parameters, error)
+            scene_file.problems += explain(
+                scene_file, key, str(type_name), cls.Parameters, error, BlockOptions.model_fields
+            )
             continue
         except ForeignFailure as error:
             message = f"{cls.path()} cannot take its parameters: {error}"

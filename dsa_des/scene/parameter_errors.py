@@ -2,7 +2,7 @@
 
 import re
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -93,11 +93,17 @@ _MUST = "must be "
 
 
 def explain(
-    scene_file: SceneFile, key: Key, what: str, model: Any, error: ValidationError
+    scene_file: SceneFile,
+    key: Key,
+    what: str,
+    model: Any,
+    error: ValidationError,
+    beside: Iterable[str] = (),
 ) -> list[Problem]:
     """Return what is wrong with a table, one problem per key, with the nearest valid name.
 
-    It stands at `key` and describes `what`, for example a block type.
+    It stands at `key` and describes `what`, for example a block type; keys `beside` those of the
+    model may have been meant too.
     """
     problems = []
     refused: set[str] = set()
@@ -108,7 +114,8 @@ def explain(
             *inside, name = map(str, item["loc"])
             instead = None if inside else getattr(model, "former", {}).get(name)
             allowed = _sibling_names(model, item["loc"])
-            hint = f"; {instead}" if instead else did_you_mean(name, allowed)
+            close = nearest(name, [*allowed, *(() if inside else beside)])
+            hint = f"; {instead}" if instead else did_you_mean(name, [close] if close else allowed)
             kind = "parameter" if key else "key"
             problems.append(scene_file.problem(at, f"unknown {kind} of {what}{hint}"))
         elif length := _list_length(model, item):

@@ -32,6 +32,11 @@ def only(lab, blocks=CHAIN, wires=WIRES, **load):
             "blocks.a.gane: unknown parameter of engine_blocks:Pulse; did you mean 'gain'?",
         ),
         (
+            "Pulse; scan_rate_hz = 5; platforms = 2",
+            "blocks.a.platforms: unknown parameter of engine_blocks:Pulse; did you mean "
+            "'platform'?",
+        ),
+        (
             "Pulse; scan_rate = 5; scan_rate_hz = 5",
             "blocks.a.scan_rate: unknown parameter of engine_blocks:Pulse; "
             "did you mean 'scan_rate_hz'?",

@@ -89,7 +89,7 @@ class ForeignFmu(Component):
         return [Signals, *(kind for kind, asked in sent.items() if asked)]
 
     def request(self, port: str) -> Any:
-        """Ask for flights where the ownship's velocity is needed."""
+        """Return a request for flights where the FMU needs the ownship's velocity."""
         if not self.p.wiring.detections.asks_for_velocity():
             return None
         return Reach((-math.pi, math.pi), (-0.5 * math.pi, 0.5 * math.pi), lasts_s=_LASTS_S)
@@ -160,7 +160,7 @@ class ForeignFmu(Component):
                 self.p.model.unit_conversion(offer[column], variable)
 
     def warnings(self) -> list[str]:
-        """Say that its communication points are not where its solver's steps are."""
+        """Return a warning where communication points do not fall on the solver's steps."""
         said = self.p.step_that_does_not_fit()
         return [] if said is None else [said]
 

@@ -159,7 +159,7 @@ class DetectionOutputs:
         return found
 
     def asks_for_velocity(self) -> bool:
-        """Whether range rates need the ownship's velocity, which the FMU does not say."""
+        """Return whether range rates need an ownship velocity that the FMU does not give."""
         return "range_rate_m_s" in self._columns and "own_velocity_north_m_s" not in self._columns
 
     def offer(self, clock: ClockSpec | None) -> SensorOffer:

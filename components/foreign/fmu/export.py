@@ -150,7 +150,7 @@ class Chain:
         self._simulator.start()
 
     def step(self, time_s: float) -> None:
-        """Let the sensors scan at an instant; what they see are the outputs."""
+        """Run the sensors' scans at an instant, and set the outputs from their detections."""
         assert self._simulator is not None
         rows = [[pose[key] for key in _POSE] for pose in self._poses]
         for pose, row in zip(self._poses, rows, strict=True):

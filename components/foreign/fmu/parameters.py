@@ -79,13 +79,13 @@ class FmuParameters(Parameters):
 
     @property
     def model(self) -> FmuModel:
-        """What the FMU says of itself."""
+        """Return the FMU's model description."""
         found: FmuModel = self._model
         return found
 
     @property
     def wiring(self) -> Wiring:
-        """How its variables are read and set."""
+        """Return which variables of the FMU are read and set, and how."""
         found: Wiring = self._wiring
         return found
 
@@ -101,7 +101,7 @@ class FmuParameters(Parameters):
         return self
 
     def without_effect(self) -> list[str]:
-        """Say which keys change nothing."""
+        """Return a sentence for each key that has no effect."""
         starred = any(source.endswith("[*]") for source in self.inputs.values())
         if self.detections or starred:
             return []
@@ -126,7 +126,7 @@ class FmuParameters(Parameters):
         return step or Fraction(1, 100)
 
     def step_that_does_not_fit(self) -> str | None:
-        """Say that communication points are no whole steps of the FMU's own, where they are not."""
+        """Return a sentence if communication points are no whole steps of the FMU's own."""
         inside = self.model.internal_step_s
         if inside and self.scan_rate_hz is not None:
             steps = 1 / (self.scan_rate_hz * inside)

@@ -20,7 +20,7 @@ _DAY = timedelta(days=1)
 
 
 def is_igc(head: bytes) -> bool:
-    """Tell whether some content begins as an IGC file does."""
+    """Return whether data begins as an IGC file does."""
     lines = head.lstrip(b"\xef\xbb\xbf\r\n ").splitlines()[:60]
     return any(re.match(rb"HFDTE[D\d]|B\d{13}[NS]\d{8}[EW][AV]", line) for line in lines)
 

@@ -12,7 +12,7 @@ from components.formats.text_rows import Problems
 
 
 def is_json(data: bytes) -> bool:
-    """Tell whether some content begins as JSON does."""
+    """Return whether data begins as JSON does."""
     return data[:4096].lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"["))
 
 

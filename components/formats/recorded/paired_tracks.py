@@ -74,7 +74,7 @@ class TrackWindows:
 
 
 def is_flying(velocity: FloatArray) -> bool:
-    """Tell whether something with this velocity flies."""
+    """Return whether an aircraft with this velocity flies."""
     return bool(np.hypot(velocity[0], velocity[1]) >= _SLOWEST_MPS)
 
 

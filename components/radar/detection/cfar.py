@@ -284,7 +284,7 @@ class CellAveraging(Effect[Averaging]):
     outside_the_proof = "no number of cells is as good as a threshold that is known"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask for ``cfar_reference_cells``."""
+        """Return whether the threshold is estimated by CFAR: needs ``cfar_reference_cells``."""
         cells = block.p.cfar_reference_cells
         if cells is None:
             return Verdict(False, "cfar_reference_cells is not given")

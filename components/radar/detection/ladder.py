@@ -140,7 +140,7 @@ class ExactDetection(Effect[str]):
     outside_the_proof = "it is a choice between two methods, of which one is always in use"
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask ``detection``; where the exact form is closed it is the cheaper one anyway."""
+        """Return whether Pd is computed exactly: by ``detection``, or where that is cheaper."""
         if block.p.detection != "exact":
             return Verdict(False, f"detection is {block.p.detection!r}")
         if block.p.cfar_reference_cells is not None:
@@ -156,12 +156,12 @@ class ExactDetection(Effect[str]):
 
 
 def closed_form(block: Any) -> bool:
-    """Say whether the exact Pd of all of a radar's targets is one power, cheaper than any rung."""
+    """Return whether the exact Pd of all targets is a single power, cheaper than any rung."""
     return block.p.pulses_summed == 1 and _models(block) <= {1, 2}
 
 
 def method_reasons(block: Any, method: str) -> list[str]:
-    """Say why a radar with ``model = "auto"`` computes Pd exactly or by a table."""
+    """Return sentences on why a radar with ``model = "auto"`` computes Pd exactly or by a table."""
     allowed = block.context.sections["accuracy"].detection_probability
     if method == "table":
         said = f"table, its error is at most {TABLE_ERROR:g} and [accuracy] allows {allowed:g}"

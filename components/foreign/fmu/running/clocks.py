@@ -50,7 +50,7 @@ class Clocks:
         return due
 
     def let_tick(self, due: Sequence[int]) -> None:
-        """Let input clocks tick, in event mode."""
+        """Tick the input clocks that are due, in event mode."""
         references = [self._clocks[number]["reference"] for number in due]
         self._of.fmu.setClock(references, [True] * len(references))
 
@@ -88,7 +88,7 @@ class Clocks:
             self.count_down(at, per_s)
 
     def count_down(self, now: int, per_s: int) -> None:
-        """Ask the clocks whose intervals the FMU sets when they tick next."""
+        """Update when each clock with an interval set by the FMU ticks next."""
         for number, clock in enumerate(self._clocks):
             if not clock["asked"]:
                 continue

@@ -138,7 +138,7 @@ class Instance:
             ValueGroup(self, kind, [(reference, len(values))], "Set").put(values)
 
     def _events(self, inputs: Any = None, due: Sequence[int] = (), raised: Any = None) -> None:
-        """Let it handle an event, in its event mode: new inputs, and clocks that tick.
+        """Process an event of the FMU in event mode: set new inputs and tick clocks.
 
         What of its own clocks ticks is added to `raised`.
         """
@@ -166,7 +166,7 @@ class Instance:
     def _exchange(
         self, inputs: Any, due: Sequence[int], tick: int, per_s: int, raised: Any
     ) -> None:
-        """Give it new inputs, or None, and let clocks tick, where it is."""
+        """Set new inputs of the FMU, if any, and tick the clocks that are due."""
         if self.spec["events"] and (due or (inputs is not None and self.spec["discrete"])):
             self.fmu.enterEventMode()
             self._events(inputs, due, raised)
