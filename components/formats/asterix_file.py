@@ -98,7 +98,7 @@ def record_asterix(
         day_s = DAY_S * round((of_day_s - records[0].time_s) / DAY_S)
     names = _names(records)
     if not names:
-        records = _of_plots(problems, records, place, warnings)
+        records = _identify_plots(problems, records, place, warnings)
         names = _names(records)
     kinds: list[Altitude] = ["barometric", "geometric"] if altitude is None else [altitude]
     heights = dict(zip(("alt", "alt instead"), kinds, strict=False))
@@ -146,7 +146,7 @@ def record_asterix(
     )  # fmt: skip
 
 
-def _of_plots(
+def _identify_plots(
     problems: Problems,
     records: list[AsterixRecord],
     place: tuple[float, float, float] | None,

@@ -226,7 +226,7 @@ def _items(record: AsterixRecord) -> dict[str, Any]:
     """Return a record's items as the library makes them."""
     values = {**record.values, "time_of_day_s": record.time_s}
     raw = {
-        f"={name}": _raw(record, name, field, values[name])
+        f"={name}": _raw_value(record, name, field, values[name])
         for name, field in FIELDS[record.category].items()
         if values.get(name) is not None
     }
@@ -246,7 +246,7 @@ def _fill_pattern(pattern: Any, raw: Mapping[str, Any]) -> Any:
     return raw[pattern] if isinstance(pattern, str) and pattern.startswith("=") else pattern
 
 
-def _raw(record: AsterixRecord, name: str, field: _Field, value: Any) -> Any:
+def _raw_value(record: AsterixRecord, name: str, field: _Field, value: Any) -> Any:
     """Return a quantity as the whole number that its bits hold, or a text as it is."""
     if name == "name":
         return value
@@ -289,7 +289,7 @@ def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str
                 if here > len(raw):
                     raise ValueError("insufficient data")
             except (ValueError, IndexError) as error:
-                raise _wrong(
+                raise _block_error(
                     path, at, f"its records are none of category {category:03d}, edition "
                     f"{'.'.join(map(str, cats[category].cv_edition))} ({error})"
                 ) from None  # fmt: skip
@@ -316,7 +316,7 @@ def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str
     return records, notes
 
 
-def _wrong(path: Path, at: int, problem: str) -> TrafficFileError:
+def _block_error(path: Path, at: int, problem: str) -> TrafficFileError:
     return TrafficFileError(str(path), [f"the data block at byte {at}: {problem}"])
 
 
@@ -328,9 +328,9 @@ def _blocks(path: Path, data: bytes) -> Iterator[tuple[int, int, bytes]]:
     while at < len(data):
         size = int.from_bytes(data[at + 1 : at + 3], "big")
         if size < 3 or at + 3 > len(data):
-            raise _wrong(path, at, "says that it has less than 3 bytes: this is no ASTERIX")
+            raise _block_error(path, at, "says that it has less than 3 bytes: this is no ASTERIX")
         if at + size > len(data):
-            raise _wrong(path, at, f"has {size} bytes, but the file ends at byte {len(data)}")
+            raise _block_error(path, at, f"has {size} bytes, but the file ends at byte {len(data)}")
         yield at, data[at], data[at + 3 : at + size]
         at += size
 
