@@ -99,12 +99,12 @@ class RecordedTables:
         return replace(self, tables=tables, _kept={})
 
     @cached_property
-    def _with_pose(self) -> Any:
+    def _join_pose(self) -> Any:
         return with_columns_of_rows(self.tables, "detections")
 
     def table(self, name: str) -> Any:
         """Return a table; detections have with them where the ownship was at each."""
-        return self._with_pose if name == "detections" else self.tables[name]
+        return self._join_pose if name == "detections" else self.tables[name]
 
     def flights(self) -> dict[str, dict[str, FloatArray]]:
         """Return the true flight of each aircraft by its name, the ownship first.

@@ -218,14 +218,14 @@ class Mavlink(Component):
             self._next_beat_s = time_s + 1.0
             datagrams.insert(0, self._link.heartbeat())
         self._udp.send(datagrams)
-        self._take(time_s)
+        self._read_messages(time_s)
         told = self._follow(int(wake.ticks[0]), own)
         found: dict[str, Message] = {"autopilot": _row(wake, self._says)}
         if told is not None:
             found["manoeuvres"] = Manoeuvres.of([int(wake.ticks[0])], [told])
         return found
 
-    def _take(self, time_s: float) -> None:
+    def _read_messages(self, time_s: float) -> None:
         """Read all messages that have come; wait for this instant's reply if one is required."""
         # Its own times are whole milliseconds.
         wanted_s = math.floor(1e3 * time_s) / 1e3

@@ -411,7 +411,7 @@ class OwnOfEntries(Message):
     }
 
 
-class Reporting(Protocol):
+class ReportTransform(Protocol):
     """Adds to what a sensor reports, or changes it."""
 
     def __call__(
@@ -420,4 +420,4 @@ class Reporting(Protocol):
         """Return what is sent; `rows` is the row of `targets` at each scan."""
 
 
-REPORT = Hook("report", Reporting, "detections: what is sent")
+REPORT = Hook("report", ReportTransform, "detections: what is sent")

@@ -375,7 +375,7 @@ class ImageCamera(ElectroOptical):
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return what the picture says of each cell."""
-        cued = {"cued": cells.is_cued()} if self._cueing else {}
+        cued = {"cued": cells.is_cued()} if self._cue_cones else {}
         return {**look.extras, **cued}
 
 

@@ -47,7 +47,9 @@ class Visibility(Effect[CellValues]):
         """Return whether haze reduces contrast: needs visibility, fog or rain in ``[weather]``."""
         weather = block.context.sections["weather"]
         if infrared_band_of(block) is not None:
-            return Verdict(False, f"{_describe_band(block)}: the air takes what it takes there")
+            return Verdict(
+                False, f"{_describe_extinction_band(block)}: the air takes what it takes there"
+            )
         if weather.visibility_km is not None:
             return Verdict(True, f"[weather] visibility_km is {weather.visibility_km:g}")
         found = [
@@ -82,7 +84,7 @@ class BandExtinction(Effect[CellValues]):
 
     def verdict(self, block: Any) -> Verdict:
         """Return whether air attenuates the camera's band: needs ``extinction_band``."""
-        return Verdict(infrared_band_of(block) is not None, _describe_band(block))
+        return Verdict(infrared_band_of(block) is not None, _describe_extinction_band(block))
 
     def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's contrast."""
@@ -189,7 +191,7 @@ class Night(Effect[bool]):
         return True
 
 
-def _describe_band(block: Any) -> str:
+def _describe_extinction_band(block: Any) -> str:
     return f"extinction_band is {block.p.extinction_band!r}"
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry import Vector, body_to_ned, unit_vector
-from components.messages.detections import REPORT, Detections, Reporting
+from components.messages.detections import REPORT, Detections, ReportTransform
 from components.messages.false_detections import sort_by_measurement
 from components.messages.targets import RelativeTargets
 from components.radar.detection.clutter import clutter_detection_probability
@@ -67,10 +67,10 @@ class NoiseReports:
     ) -> Detections:
         """Return the report with the false alarms of its scans."""
         for which, crossing in enumerate(self._crossings):
-            detections = self._with_alarms(detections, targets, rows, crossing, which)
+            detections = self._add_false_alarms(detections, targets, rows, crossing, which)
         return sort_by_measurement(detections)
 
-    def _with_alarms(
+    def _add_false_alarms(
         self,
         detections: Detections,
         targets: RelativeTargets,
@@ -112,7 +112,7 @@ class NoiseReports:
         )
 
 
-class FalseAlarms(Effect[Reporting]):
+class FalseAlarms(Effect[ReportTransform]):
     """False alarms by scan: Binomial(resolution cells, Pfa), anywhere in the field of view.
 
     Pfa is how often noise crosses the threshold that targets cross, where a look is cued that of
@@ -203,7 +203,7 @@ class GroundReports:
     ) -> Detections:
         """Return the report with the ground's false alarms of its scans."""
         numbers = zip(rows.tolist(), detections.run.tolist(), detections.scan.tolist(), strict=True)
-        crossed = [self._of_scan(targets, *number) for number in numbers]
+        crossed = [self._find_ground_crossings(targets, *number) for number in numbers]
         counts = [len(cell) for cell, _ in crossed]
         row = np.repeat(np.arange(len(crossed)), counts)
         if len(row) == 0:
@@ -230,7 +230,7 @@ class GroundReports:
         # Without any here, the report is in that order already.
         return sort_by_measurement(joined)
 
-    def _of_scan(
+    def _find_ground_crossings(
         self, targets: RelativeTargets, row: int, run: int, scan: int
     ) -> tuple[IntArray, FloatArray]:
         """Return the cells that the ground crosses the threshold in, and their CNR."""
@@ -303,7 +303,7 @@ class GroundReports:
         return pfa, clutter.total
 
 
-class ClutterAlarms(Effect[Reporting]):
+class ClutterAlarms(Effect[ReportTransform]):
     """Reports of cells in which the ground crosses the threshold that noise does not.
 
     With an adaptive threshold there are none beyond those of noise, whose number it keeps. With

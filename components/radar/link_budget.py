@@ -230,11 +230,11 @@ def implausible(parameters: Any) -> list[str]:
         if value is None or low <= value <= high:
             continue
         text = f"{key} is {value:g} {unit}: implausible, radars have {low:g} to {high:g} {unit}"
-        said.append(text + _other_unit(value, low, high, unit))
+        said.append(text + _describe_plausible_unit(value, low, high, unit))
     return said
 
 
-def _other_unit(value: float, low: float, high: float, unit: str) -> str:
+def _describe_plausible_unit(value: float, low: float, high: float, unit: str) -> str:
     """Name a multiple of the unit in which the number would be plausible."""
     if unit == "dB":
         return ""

@@ -267,11 +267,11 @@ class FoldedEcho(Echo):
 
     def __call__(self, cells: Any) -> FloatArray:
         """Return it for the PRFs that decide, m²."""
-        each = np.stack([self._of_prf(cells, prf_hz)[0] for prf_hz in self.block.p.prfs_hz])
+        each = np.stack([self._echo_at_prf(cells, prf_hz)[0] for prf_hz in self.block.p.prfs_hz])
         needed: int = self.block.p.prfs_needed or len(each)
         return np.asarray(np.sort(each, axis=0)[needed - 1])
 
-    def _of_prf(self, cells: Cells, prf_hz: float) -> tuple[FloatArray, FloatArray]:
+    def _echo_at_prf(self, cells: Cells, prf_hz: float) -> tuple[FloatArray, FloatArray]:
         """Return what one PRF hears, m², and at which range most of it is."""
         total, most, where = np.zeros(len(cells)), np.zeros(len(cells)), np.array(cells.range_m)
         for other_m in other_ranges_m(cells.range_m, unambiguous_range_m(prf_hz), _FARTHEST_M):
@@ -315,7 +315,7 @@ class FoldedEcho(Echo):
         self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Those of the ground, or along the beam, at the range that most of it comes from."""
-        _, at_m = self._of_prf(cells, self.block.p.prf_hz)
+        _, at_m = self._echo_at_prf(cells, self.block.p.prf_hz)
         elevation = cells.elevation_rad
         if self.terrain is not None:
             height_m = cells.of_row("own_alt_m") - self.terrain.height_m

@@ -121,7 +121,7 @@ class LinkBudgetRadar(Radar):
     def setup(self) -> None:
         """Store the scene's effects on the SNR."""
         super().setup()
-        self._echo_budget = self._without_blind_range()
+        self._echo_budget = self._far_field_link_budget()
         self.mean_rcs_m2 = self.built_one(MEAN_RCS) or constant_rcs_m2
         self._beam_shape = self.built_one(BEAM_SHAPE)
         self._propagation = self.built_one(PROPAGATION)
@@ -134,7 +134,7 @@ class LinkBudgetRadar(Radar):
     def _set_threshold(self) -> None:
         """Set the threshold after the scene's effects, where it is not known before."""
 
-    def _without_blind_range(self) -> Any:
+    def _far_field_link_budget(self) -> Any:
         """Return the link budget that ends where the antenna's far field does."""
         far_field = replace(self.budget, minimum_range_m=None)
         # A minimum range inside the near field is the scene's word that there are echoes.

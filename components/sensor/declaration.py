@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry import body_to_ned, unit_vector
-from components.messages.detections import REPORT, Detections, Reporting
+from components.messages.detections import REPORT, Detections, ReportTransform
 from components.sensor.look import DECLARATION, Cells, Judging, Look
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -333,7 +333,7 @@ class DeclaredPlaces:
         return self._first
 
 
-class DeclarationByPlace(Effect[Reporting]):
+class DeclarationByPlace(Effect[ReportTransform]):
     """Marks detections whose position had others in m of the last n scans, targets or false alarms.
 
     Nothing but measured values decides; places are compared in north-east-down by what the

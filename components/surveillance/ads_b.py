@@ -276,7 +276,7 @@ class AdsB(CooperativeSensor):
         if not len(asked):
             return none, none, none
         now_ns = cells.state_ns[asked]
-        oldest_ns = now_ns - self._oldest_age_ns(kind, cells, asked)
+        oldest_ns = now_ns - self._max_message_age_ns(kind, cells, asked)
         count = math.ceil(int((now_ns - oldest_ns).max()) / (SHORTEST_S * NANOSECONDS)) + 1
         senders = Transponders.from_cells(cells, asked)
         number, sent_ns, counts = self._clocks[kind].latest(
@@ -302,7 +302,7 @@ class AdsB(CooperativeSensor):
         newest = counts[some].argmax(axis=1)
         return asked[some], number[some, newest], sent_ns[some, newest]
 
-    def _oldest_age_ns(self, kind: str, cells: Cells, asked: IntArray) -> IntArray:
+    def _max_message_age_ns(self, kind: str, cells: Cells, asked: IntArray) -> IntArray:
         """Return how old a message may be that counts: a position came since the scan before."""
         if kind == "velocity":
             return np.full(len(asked), round(self.p.velocity_age_s * NANOSECONDS))

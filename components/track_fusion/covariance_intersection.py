@@ -175,7 +175,9 @@ class CovarianceIntersection(Component):
 
     def run(self, wake: Wake) -> StateTracks | None:
         """Process the trackers' reports in order of time, and return the fused tracks."""
-        came = {new.source: self._fresh(new, wake) for new in wake.arrivals("tracks")}
+        came = {
+            new.source: self._select_newest_reports(new, wake) for new in wake.arrivals("tracks")
+        }
         row_of = {name: last_of_run(wake.instants, new.instants) for name, new in came.items()}
         rows = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *row_of.values()]))
         if len(rows) == 0:
@@ -205,7 +207,7 @@ class CovarianceIntersection(Component):
             KeyedTable.concatenate(parts), rows, wake.instants.take(rows), self.sensors
         )
 
-    def _fresh(self, new: Arrivals, wake: Wake) -> Arrivals:
+    def _select_newest_reports(self, new: Arrivals, wake: Wake) -> Arrivals:
         """Return the reports that count: none that another one overtook, one at an instant."""
         made, replica = new.message.tick, new.message.run
         newest = self._newest.get(new.source, np.empty(0, dtype=np.int64))
@@ -254,13 +256,13 @@ class CovarianceIntersection(Component):
             message, replica = came[name].message, wake.run[row]
             index = self.trackers.index(name)
             origin = records.origin[:, np.searchsorted(records.replica, replica)]
-            masks = self._masks(message.sensors)
+            masks = self._sensor_bits(message.sensors)
             came_now, of = local_tracks(message, replica, index, origin, masks, self.p.tentative)
             parts.append(came_now.with_columns(row=row[of]))
             reported_at[index] = row
         return LocalTracks.concatenate(parts), reported_at
 
-    def _masks(self, sensors: Sequence[str]) -> list[int]:
+    def _sensor_bits(self, sensors: Sequence[str]) -> list[int]:
         """Return the bit of each of a tracker's sensors among all."""
         unknown = [name for name in sensors if name not in self.sensors]
         self.sensors = (*self.sensors, *unknown)

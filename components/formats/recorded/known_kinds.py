@@ -82,9 +82,9 @@ def record(
     data = _unzip(problems, read_content(path, problems))
     stem = re.sub(r"(\.\w{1,7}){1,2}$", "", path.name) or path.name
     if data.startswith(_PARQUET):
-        return _of_parquet(problems, data, altitude, stem)
+        return _read_parquet(problems, data, altitude, stem)
     if is_capture(data):
-        return _of_capture(problems, data, altitude, place)
+        return _read_capture(problems, data, altitude, place)
     if path.suffix.lower() == ".ast" or _is_asterix(data):
         return record_asterix(problems, data, altitude, place=place)
     log = _log_of(problems, data, stem)
@@ -199,7 +199,7 @@ def _is_readable(path: Path, data: bytes) -> bool:
     return True
 
 
-def _of_capture(
+def _read_capture(
     problems: Problems, data: bytes, altitude: Altitude | None,
     place: tuple[float, float, float] | None,
 ) -> Recording:  # fmt: skip
@@ -230,7 +230,9 @@ def _is_daa(text: str) -> bool:
 _BATCH = 16_384
 
 
-def _of_parquet(problems: Problems, data: bytes, altitude: Altitude | None, stem: str) -> Recording:
+def _read_parquet(
+    problems: Problems, data: bytes, altitude: Altitude | None, stem: str
+) -> Recording:
     """Return the aircraft of a Parquet table, which has the columns of a CSV table."""
     import pyarrow as pa
     import pyarrow.compute as pc
