@@ -15,7 +15,7 @@ from components.guidance.daidalus import (
     smaller,
 )
 from components.messages.alerts import AlertLevels
-from components.messages.detections import without_range
+from components.messages.detections import describe_rangeless
 from components.messages.steering import (
     SLOWEST_TURN_DEG_S,
     ChosenSides,
@@ -208,7 +208,7 @@ class TurnOut(Component):
                 known = [old for old in self._heard.get(run, ()) if old[0] > since]
                 self._heard[run] = (*known, (one[0], one[1], one[2]))
 
-    def _other_choices(self, run: int, tick: int) -> list[tuple[int, int]]:
+    def _find_valid_choices(self, run: int, tick: int) -> list[tuple[int, int]]:
         """Return address and side of every other aircraft whose choice is valid at an instant.
 
         The lowest address first; windows may know more than has come by then.
@@ -236,7 +236,9 @@ class TurnOut(Component):
     def _must_give_way(self, run: int, tick: int) -> bool:
         """Return whether an aircraft of lower address has chosen a manoeuvre that conflicts."""
         mine = self._repeated_side(run, tick) if self.p.address is not None else 0
-        first = [side for a, side in self._other_choices(run, tick) if a < (self.p.address or 0)]
+        first = [
+            side for a, side in self._find_valid_choices(run, tick) if a < (self.p.address or 0)
+        ]
         return bool(mine and first and self._matching_side(first[0]) != mine)
 
     def _choose(self, run: int, tick: int, changes: tuple[float, float]) -> float | None:
@@ -245,7 +247,7 @@ class TurnOut(Component):
 
         Without a way there it is free, but not before its time.
         """
-        others = self._other_choices(run, tick) if self.p.address is not None else []
+        others = self._find_valid_choices(run, tick) if self.p.address is not None else []
         if others:
             (address, side), mine = others[0], self._repeated_side(run, tick)
             # Only a lower address changes what was chosen in this conflict.
@@ -351,7 +353,7 @@ class TurnAway(Component):
 
     def warnings(self) -> list[str]:
         """Warn that no sensor measures the range that it needs."""
-        blind = "" if self.p.without_range else without_range(self.context.producers)
+        blind = "" if self.p.without_range else describe_rangeless(self.context.producers)
         if not blind:
             return []
         return [f"without_range is false and {blind} measures no range: it never turns"]

@@ -82,7 +82,7 @@ class BelievedPositions:
         body = level * np.cos(azimuth), level * np.sin(azimuth), -range_m * np.sin(elevation)
         north, east, down = body_to_ned(*body, yaw, pitch, roll)
         # A row of its own for every instant of measurement.
-        line, of, made = _by_instant(sights.tick, row, sights.measured_tick[new])
+        line, of, made = _group_by_instant(sights.tick, row, sights.measured_tick[new])
         position = np.full((len(made), self._targets, 3), np.nan)
         position[line, sights.target[new]] = np.stack([east, north, -down], axis=-1)
         self.add_truth(arrived.instants.take(of), made / wake.ticks_per_s, position)
@@ -207,7 +207,7 @@ def true_positions_m(states: TrafficStates) -> FloatArray:
     return position
 
 
-def _by_instant(
+def _group_by_instant(
     tick: IntArray, row: IntArray, measured: IntArray
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Return the line of each entry, and the row and the instant of measurement of each line.

@@ -246,11 +246,11 @@ class BelievedTracks:
 
     def forget(self, asked: RunTicks, times_s: FloatArray, wake: Wake) -> None:
         """Drop what later ones have replaced at some scans."""
-        self._estimates.keep(_asked_later(self._estimates.arrival_ticks, asked, wake))
-        self._true = self._true.take(_asked_later(self._true.instants, asked, wake))
+        self._estimates.keep(_is_needed_later(self._estimates.arrival_ticks, asked, wake))
+        self._true = self._true.take(_is_needed_later(self._true.instants, asked, wake))
 
 
-def _asked_later(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
+def _is_needed_later(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
     """Return which rows later scans may still need: the last one before each of them, and later
     ones.
     """

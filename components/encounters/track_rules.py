@@ -141,12 +141,12 @@ class TrackRules:
         return Commands(
             self.altitude_ft(tracks),
             tracks.initial[self._index_of(SPEED)] * FT_S_PER_KT,
-            self._over_time(tracks, ACCELERATION) * FT_S_PER_KT,
-            self._over_time(tracks, CLIMB) / 60.0,
-            np.radians(self._over_time(tracks, TURN)),
+            self._values_by_second(tracks, ACCELERATION) * FT_S_PER_KT,
+            self._values_by_second(tracks, CLIMB) / 60.0,
+            np.radians(self._values_by_second(tracks, TURN)),
         )
 
-    def _over_time(self, tracks: SampledTracks, label: str) -> FloatArray:
+    def _values_by_second(self, tracks: SampledTracks, label: str) -> FloatArray:
         index, dynamic = self._index_of(label), self.model.dynamic
         if index in dynamic:
             result: FloatArray = tracks.changing[:, dynamic.index(index)]

@@ -170,7 +170,7 @@ def _apply_polar_change(
     moved = state.copy()
     moved[:3] = sensor_m + turned[0] / inverse
     moved[3:6] = sum(w * axis for w, axis in zip(by_range, turned, strict=True)) / inverse
-    step = product(_from_polar(turned, change[1], inverse, by_range), to_polar)
+    step = product(_derivative_by_polar(turned, change[1], inverse, by_range), to_polar)
     whole = covariance.copy()
     whole[:6, :6] = multiply_by_transpose(product(step, covariance[:6, :6]), step)
     if len(state) > 6:
@@ -221,7 +221,7 @@ def _rotate_axes(axes: list[FloatArray], one: FloatArray, other: FloatArray) -> 
     ]
 
 
-def _from_polar(
+def _derivative_by_polar(
     axes: list[FloatArray], other: FloatArray, inverse: FloatArray, by_range: FloatArray
 ) -> FloatArray:
     """Return the derivative of position and velocity by polar coordinates."""

@@ -170,7 +170,7 @@ class Process(Component):
     def start(self) -> None:
         """Start the program ahead of the first call."""
         if not self._link.runs:
-            self._greet()
+            self._start_program()
 
     # -- calls ---------------------------------------------------------------------------------
 
@@ -220,7 +220,7 @@ class Process(Component):
             self._state = self._is_in.state = after[0].column(0)[0].as_py()
         return [(about, table) for about, table in answer if about.get("table") != _STATE]
 
-    def _greet(self) -> None:
+    def _start_program(self) -> None:
         self._link.start()
         about = {
             "version": VERSION, "block": self.name, "ticks_per_s": str(self.context.ticks_per_s),

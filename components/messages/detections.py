@@ -234,7 +234,7 @@ def sensor_offers(producers: Iterable[Any]) -> dict[str, Any]:
     return offers
 
 
-def without_range(producers: Iterable[Any]) -> str:
+def describe_rangeless(producers: Iterable[Any]) -> str:
     """Return who leads to some blocks, where no sensor among them measures range; else nothing."""
     offers = sensor_offers(producers)
     if not offers or any(
@@ -411,7 +411,7 @@ class OwnOfEntries(Message):
     }
 
 
-class Reporting(Protocol):
+class ReportTransform(Protocol):
     """Adds to what a sensor reports, or changes it."""
 
     def __call__(
@@ -420,4 +420,4 @@ class Reporting(Protocol):
         """Return what is sent; `rows` is the row of `targets` at each scan."""
 
 
-REPORT = Hook("report", Reporting, "detections: what is sent")
+REPORT = Hook("report", ReportTransform, "detections: what is sent")

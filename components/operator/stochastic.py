@@ -74,7 +74,7 @@ class StochasticParameters(ConfParameters):
     )
 
     @model_validator(mode="after")
-    def _settles(self) -> Self:
+    def _check_easing(self) -> Self:
         least_deg = LEAST_EASING_S * self.turn_rate_deg_s
         if 0.0 < self.eases_deg < least_deg:
             raise ValueError(

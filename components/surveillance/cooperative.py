@@ -41,7 +41,7 @@ _MEASURED_KEYS = (
 )  # fmt: skip
 
 
-def _as_read(value: Any) -> Any:
+def _tuple_if_list(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -77,7 +77,7 @@ class CooperativeParameters(SensorParameters):
                 f"{key} is given: a cooperative sensor has no axes and no grid of its own; "
                 "leave it out"
                 for key in _MEASURED_KEYS
-                if key in given and _as_read(given[key]) != fields[key].default
+                if key in given and _tuple_if_list(given[key]) != fields[key].default
             ]
         )
         return given
@@ -168,7 +168,7 @@ class CooperativeSensor(Sensor):
             if name not in names:
                 raise ValueError(f"leaves_out: there is no {name!r}{did_you_mean(name, names)}")
 
-    def of_others(self, cells: Cells, heard: BoolArray, address: IntArray) -> BoolArray:
+    def is_of_others(self, cells: Cells, heard: BoolArray, address: IntArray) -> BoolArray:
         """Return which received cells are not of an aircraft that is left out by its address."""
         roster = cells.roster
         for name in self.p.leaves_out:

@@ -239,11 +239,13 @@ def position_variance(part: TrackStore, *, late: bool = False) -> FloatArray:
     good = np.isfinite(total) & (total >= 0.0)
     if not bool(good.all()):
         number = int(part.number[~good][0])
-        raise ValueError(f"the covariance of track {number} has become singular{_advice(late)}")
+        raise ValueError(
+            f"the covariance of track {number} has become singular{_advise_on_late_looks(late)}"
+        )
     return total
 
 
-def _advice(late: bool) -> str:
+def _advise_on_late_looks(late: bool) -> str:
     if late:
         return (
             " as it was taken back to a late look: late = 'rerun' works on looks in their own "

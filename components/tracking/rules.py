@@ -95,16 +95,16 @@ class LastingErrors:
         rounding = step * step / 12.0
         white, remembered = variance - rounding, 0.0
         if len(self.variance):
-            lasting = _of_cells(self.variance, at)
+            lasting = _take_cells(self.variance, at)
             if self._is_across_angles:
-                lasting = lasting + _of_cells(self.across_m2, at) / np.maximum(range_m, 1.0) ** 2
+                lasting = lasting + _take_cells(self.across_m2, at) / np.maximum(range_m, 1.0) ** 2
             if self._is_shared:
-                share = _of_cells(self.share, at)
+                share = _take_cells(self.share, at)
                 stated = np.maximum(lasting + share * variance, 0.0)
                 lasting = np.where(share > 0.0, stated, lasting)
             white = white - lasting.sum(axis=0)
             # Time over an infinite time constant is 0: nothing is forgotten.
-            forgotten = np.exp(-np.where(seen, since_s, 0.0) / _of_cells(self.lasts_s, at))
+            forgotten = np.exp(-np.where(seen, since_s, 0.0) / _take_cells(self.lasts_s, at))
             remembered = (lasting * forgotten).sum(axis=0)
         safe = np.where(step > 0.0, step, 1.0)
         white = np.maximum(white, 0.0)
@@ -114,7 +114,7 @@ class LastingErrors:
         return np.where(seen, rounding + remembered, 0.0)
 
 
-def _of_cells(values: FloatArray, at: IntArray) -> FloatArray:
+def _take_cells(values: FloatArray, at: IntArray) -> FloatArray:
     """Return values (parts, quantities, sensors) at flat positions in the last two axes."""
     return values.reshape(len(values), values[0].size).take(at, axis=1)
 
