@@ -15,7 +15,7 @@ from components.guidance.daidalus import (
     smaller,
 )
 from components.messages.alerts import AlertLevels
-from components.messages.detections import without_range
+from components.messages.detections import describe_rangeless
 from components.messages.steering import (
     SLOWEST_TURN_DEG_S,
     ChosenSides,
@@ -351,7 +351,7 @@ class TurnAway(Component):
 
     def warnings(self) -> list[str]:
         """Warn that no sensor measures the range that it needs."""
-        blind = "" if self.p.without_range else without_range(self.context.producers)
+        blind = "" if self.p.without_range else describe_rangeless(self.context.producers)
         if not blind:
             return []
         return [f"without_range is false and {blind} measures no range: it never turns"]

@@ -142,7 +142,7 @@ def seen_positions(run: RecordedTables) -> Iterator[DetectedPlace]:
     number = run.stack_columns("detections", names)
     there = np.flatnonzero(~np.isnan(number).any(axis=0))
     known = np.where(np.isnan(number), 0.0, number)
-    run.refuse_large("detections", dict(zip(names, known, strict=True)))
+    run.refuse_large_values("detections", dict(zip(names, known, strict=True)))
     if len(there) == 0:
         return
     number = run.stack_columns("detections", names, there)

@@ -346,7 +346,7 @@ class ImageCamera(ElectroOptical):
 
     def _direction(self, pixel: AnyArray, attitude: Any) -> FloatArray:
         """Return the direction in NED of a place in the frame."""
-        seen = self.axes.pointing(*map(np.atleast_1d, self.pinhole.direction(*pixel)))
+        seen = self.axes.true_direction(*map(np.atleast_1d, self.pinhole.direction(*pixel)))
         return np.array(body_to_ned(*unit_vector(*seen), *attitude))[:, 0]
 
     def _pixel_of(self, direction: FloatArray, attitude: Any) -> FloatArray:
@@ -367,7 +367,7 @@ class ImageCamera(ElectroOptical):
     ) -> Any:  # fmt: skip
         """Report the spot's place in the picture, with what errors the scene adds to it."""
         column, row = (look.extras[name][detected] for name in ("column_px", "row_px"))
-        seen = self.axes.pointing(*self.pinhole.direction(column, row))
+        seen = self.axes.true_direction(*self.pinhole.direction(column, row))
         known = np.isfinite(column)
         azimuth_rad = np.where(known, seen[0], azimuth_rad)
         elevation_rad = np.where(known, seen[1], elevation_rad)

@@ -222,7 +222,7 @@ _RANGES = {
 _PREFIXES = {1e3: "k", 1e6: "M", 1e9: "G", 1e-3: "m", 1e-6: "µ"}
 
 
-def implausible(parameters: Any) -> list[str]:
+def implausible_value_warnings(parameters: Any) -> list[str]:
     """Return a warning for each value of a link budget that no radar has, by its key."""
     said = []
     for key, (low, high, unit) in _RANGES.items():
@@ -257,7 +257,7 @@ def gain_of_beam_db(azimuth_deg: float | None, elevation_deg: float | None) -> f
     return max(0.0, 10.0 * math.log10(GAIN_TIMES_BEAM / (azimuth_deg * elevation_deg)))
 
 
-def beam_against_gain(parameters: Any) -> list[str]:
+def beam_gain_warnings(parameters: Any) -> list[str]:
     """Return a warning where beam width and antenna gain contradict each other by over 3 dB.
 
     A gain of 30,000 over the product of the beamwidths in degrees is that of antennas as they are

@@ -227,7 +227,7 @@ def _is_chosen(cells: IntArray, chosen: IntArray, count: int) -> IntArray:
     return np.flatnonzero(inside[cells])
 
 
-def noise_at_targets(parameters: Any) -> list[str]:
+def noise_report_warnings(parameters: Any) -> list[str]:
     """Return a warning where noise detections are reported exactly at the target."""
     steps = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
     exact = [step for step in steps if getattr(parameters, step) == 0]

@@ -216,9 +216,9 @@ class Cells:
         return self.target if roster.is_shared else roster.craft(self.target, self.run)
 
     @cached_property
-    def equipped(self) -> IntArray:
+    def equipage_rows(self) -> IntArray:
         """Where each cell's target stands in the roster's equipage, as it is then."""
-        return self.roster.equipped(self.craft, self.state_ns)
+        return self.roster.equipage_rows(self.craft, self.state_ns)
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
         """Return uniform draws keyed by each cell's target and scan."""

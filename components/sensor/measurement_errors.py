@@ -113,7 +113,7 @@ class ErrorModel:
         instant_ns = cells.instant_ns[detected]
         if look.noise is not None and self._signal:
             true = self._in_cells(true, look.noise[detected], keys, scan, run, instant_ns)
-        return self.of_noise(true, signal, (keys, scan, instant_ns, run))
+        return self.measure_noise(true, signal, (keys, scan, instant_ns, run))
 
     def _in_cells(
         self,
@@ -157,7 +157,7 @@ class ErrorModel:
             fields["azimuth"] = (low, high)
         return fields
 
-    def of_noise(self, where: Values, signal: Values, drawn: Any) -> Measured:
+    def measure_noise(self, where: Values, signal: Values, drawn: Any) -> Measured:
         """Return how something that is not there is reported: as what is there would be.
 
         `drawn` holds keys, scan, instant and run by which errors are drawn, or is None.
@@ -253,7 +253,7 @@ def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError
     return lasting
 
 
-def with_parts(
+def add_error_parts(
     errors: Mapping[str, LastingError], parts: Mapping[str, Iterable[LastingPart]]
 ) -> dict[str, LastingError]:
     """Return lasting errors with more parts, of some quantities."""

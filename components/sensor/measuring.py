@@ -107,7 +107,7 @@ class Measuring(Component):
         without them a position by the edge of the field of view would never be reported beyond it.
         The last value holds the other measured columns of `Detections`.
         """
-        return self._to_body_axes(*self._measurement.of_noise(where, signal, drawn))
+        return self._to_body_axes(*self._measurement.measure_noise(where, signal, drawn))
 
     def _to_body_axes(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]

@@ -34,9 +34,9 @@ from components.sensor.look import DECLARATION, STRENGTH, Cells, Judging, Look, 
 from components.sensor.measurement_errors import (
     MEASUREMENT,
     MeasurementErrors,
+    add_error_parts,
     constant_variances,
     lasting_errors,
-    with_parts,
 )
 from components.sensor.measuring import Measuring
 from components.sensor.mounting import AXES, Mounting
@@ -175,7 +175,7 @@ class Sensor(Measuring):
         constant: dict[str, Any] = constant_variances(self.p, self.steps)
         lasting = lasting_errors(self.p, self.steps)
         if Glint().verdict(self).simulated:
-            lasting = with_parts(lasting, Glint().build(self).lasting())
+            lasting = add_error_parts(lasting, Glint().build(self).lasting())
         reach = self.stated_reach
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
             constant = {**constant, AZIMUTH: None, ELEVATION: None}
@@ -190,7 +190,7 @@ class Sensor(Measuring):
         noise = navigation_noise(self.context)
         if self.turned_by_belief and any(map(any, noise)):  # differs with the pose
             unstated_m2 = 0.0 if self.measures_range else max(noise[0]) ** 2
-            lasting = with_parts(lasting, lasting_navigation(self.context))
+            lasting = add_error_parts(lasting, lasting_navigation(self.context))
             constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}
         return SensorOffer(
             self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,

@@ -133,7 +133,7 @@ def leaders(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
     return order[first], of
 
 
-def without_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -> LocalTracks:
+def drop_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -> LocalTracks:
     """Return tracks, of which those no longer belong that are too far from their leader."""
     member = np.flatnonzero(tracks.system > 0)
     if len(member) == 0:

@@ -79,7 +79,7 @@ class Promises:
         return np.maximum(life, soonest.astype(np.int64))
 
 
-def seeing(misdetections: IntArray) -> BoolArray:
+def find_seeing_sensors(misdetections: IntArray) -> BoolArray:
     """Return which sensors see which tracks, (sensors, n), from their misdetections."""
     return np.asarray(
         (misdetections < BLIND_AFTER)
@@ -107,7 +107,7 @@ def expected_looks(
     if used == 0:
         return looked
     mine = sensors[of]
-    sees = seeing(part.misdetections)
+    sees = find_seeing_sensors(part.misdetections)
     where: tuple[FloatArray, FloatArray, FloatArray] | None = None
     for i, field in enumerate(fields):
         if not used >> i & 1:

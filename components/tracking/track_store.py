@@ -99,7 +99,7 @@ class TrackStore(KeyedTable):
         """Return what the filter knows of the tracks."""
         return Estimates(self.states(), self.covariances(), self.weights)
 
-    def with_estimates(self, estimates: Estimates, **columns: Any) -> Self:
+    def replace_estimates(self, estimates: Estimates, **columns: Any) -> Self:
         """Return the same tracks with other estimates, and other values in some columns."""
         return self.with_columns(**estimate_columns(estimates), **columns)
 

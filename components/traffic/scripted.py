@@ -72,17 +72,19 @@ class Flight(Heights):
         if air is None or self.heights == "geometric":
             return self
 
-        def lifted(one: Any, key: str) -> Any:
+        def replace_altitude(one: Any, key: str) -> Any:
             if getattr(one, key, None) is None:
                 return one
             return one.model_copy(update={key: float(self.height_m(air, getattr(one, key)))})
 
         legs = [
-            leg.model_copy(update={"points": [lifted(point, "alt_m") for point in leg.points]})
-            if isinstance(leg, Waypoints) else lifted(leg, "to_alt_m")
+            leg.model_copy(
+                update={"points": [replace_altitude(point, "alt_m") for point in leg.points]}
+            )
+            if isinstance(leg, Waypoints) else replace_altitude(leg, "to_alt_m")
             for leg in self.legs
         ]  # fmt: skip
-        return cast(Self, lifted(self.model_copy(update={"legs": legs}), "alt_m"))
+        return cast(Self, replace_altitude(self.model_copy(update={"legs": legs}), "alt_m"))
 
 
 class Ownship(Flight, Aircraft):

@@ -332,7 +332,7 @@ class TrafficSource(Component):
         self._flown = replace(flown, fleet=fleet)
         assert isinstance(self.own, SteeredFlight)
         self.own = SteeredFlight(self.own.flight, fleet)
-        self.targets = self._flown.as_flown()
+        self.targets = self._flown.flown_target_flights()
         return known
 
     def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
