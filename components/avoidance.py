@@ -136,7 +136,7 @@ class TurnOut(Component):
                 )
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: sides only where it tells them."""
+        """Return the recorded message types: chosen sides only where they are sent."""
         return [Manoeuvres] if self.p.address is None else [*super().records()]
 
     def offer(self, port: str) -> int | None:
@@ -258,7 +258,7 @@ class TurnOut(Component):
         return smaller(changes) if self._is_free(run, tick) else None
 
     def _manoeuvre(self, change: float) -> Manoeuvre:
-        """Return what makes a change."""
+        """Return the manoeuvre that makes a change."""
         conf = self._configuration
         if self.p.manoeuvre == "climb":
             beyond_m = math.copysign(self.p.beyond_m, change)

@@ -245,7 +245,7 @@ class DaidalusAlerting(Component):
 
 
 def _track_columns(flights: BelievedFlights) -> dict[str, AnyArray]:
-    """Return what is recorded of the tracks that are believed; nothing where there are none."""
+    """Return the recorded columns of the believed tracks; none without tracks."""
     if flights.number is None or flights.age_s is None:
         return {}
     return {"track": flights.number, "track_age_s": flights.age_s}

@@ -63,7 +63,7 @@ def make_listening(replicas: int, targets: int) -> Listening:
 
 
 def updates(replicas: int, targets: int) -> Callable[[], object]:
-    """Return what tracks all targets of some replicas anew, gating and association included."""
+    """Return a function that tracks all targets of some replicas anew, with gating."""
     known = make_listening(replicas, targets)
 
     def track() -> None:
@@ -136,7 +136,7 @@ class PlainLook:
 
 
 def measure_state(state: FloatArray, look: PlainLook, size: int) -> tuple[FloatArray, FloatArray]:
-    """Return what a look would measure of a state, (size,), and the derivative, (size, 6)."""
+    """Return the expected measurement of a state, (size,), and its derivative, (size, 6)."""
     away = state[:3] - look.position_m
     x, y, z = look.to_body @ away
     level, distance = hypot(x, y), sqrt(x * x + y * y + z * z)

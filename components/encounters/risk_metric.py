@@ -196,7 +196,7 @@ class RiskRatios(Mitigated):
         return result
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return what no manoeuvre changes, and the geometry of the closest approach."""
+        """Return the results that no manoeuvre changes, and the closest approach's geometry."""
         meeting, sizes_m = meetings_in_plane(group, self.p), self.p.sizes_m
         if meeting is None:
             result = self._nominal_events(group)

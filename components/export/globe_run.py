@@ -78,7 +78,7 @@ class GlobeRun:
 
 
 def globe_run(run: RecordedTables) -> GlobeRun:
-    """Return what globes show of a run; `UsageError` where its tables are not those of one."""
+    """Return the contents of a globe view of a run; `UsageError` for tables of none."""
     flights = [
         Course(
             name, ON_DARK["own" if name == run.own_name else "truth"], flight["time_s"],

@@ -236,7 +236,7 @@ class ImageCamera(ElectroOptical):
         contrast: float,
         key: Any,
     ) -> dict[str, float]:
-        """Return what the two frames of a cell say."""
+        """Return the measurement from the two frames of a cell."""
         middle = np.array([now.column[cell], now.row[cell]])
         points = np.concatenate(outlines)
         extent = float(np.nanmax(np.abs(points), initial=0.0))
@@ -374,7 +374,7 @@ class ImageCamera(ElectroOptical):
         return super()._measure(cells, detected, look, azimuth_rad, elevation_rad, range_m)
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
-        """Return what the picture says of each cell."""
+        """Return the recorded picture columns of each cell."""
         cued = {"cued": cells.is_cued()} if self._cue_cones else {}
         return {**look.extras, **cued}
 

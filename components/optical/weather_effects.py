@@ -143,7 +143,7 @@ class ObscuringCells(Effect[CellValues]):
 
 
 def _fog_per_m(block: Any, water_g_m3: float) -> float:
-    """Return what fog takes of visible light, of an infrared band or of a laser's, 1/m."""
+    """Return the extinction by fog of visible light, an infrared band or a laser, 1/m."""
     visibility_m = float(fog_visibility_m(water_g_m3))
     if math.isinf(visibility_m):
         return 0.0

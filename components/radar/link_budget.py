@@ -122,7 +122,7 @@ class LinkBudget:
         return unflatten(self.snr_of_cells(distance, rcs), shape)
 
     def snr_of_cells(self, range_m: FloatArray, rcs_m2: FloatArray) -> FloatArray:
-        """Return the same for flat arrays of one shape that are known to be 0 or more.
+        """Return linear SNR for flat arrays of one shape that are known to be 0 or more.
 
         Closer than `nearest_m` the far-field equation does not hold and the receiver is still
         blind from its own pulse.
@@ -178,7 +178,7 @@ def calibrated_bandwidth(
 
 
 def with_bandwidth(budget: LinkBudget, bandwidth_hz: float) -> LinkBudget:
-    """Return the same budget with another bandwidth."""
+    """Return the link budget with another bandwidth."""
     return replace(budget, bandwidth_hz=bandwidth_hz)
 
 

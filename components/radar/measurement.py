@@ -251,7 +251,7 @@ class OwnVelocity(Effect[ReportTransform]):
     outside_the_proof = "it fills columns that are null without it"
 
     def build(self, block: Any) -> ReportTransform:
-        """Return what adds the velocity to a report."""
+        """Return a function that adds the own velocity to a report."""
         ticks_per_s = block.context.ticks_per_s
 
         def with_velocity(

@@ -67,7 +67,7 @@ class RainClutter(Effect[Echo]):
         return Verdict(rate > 0 or somewhere.simulated, because)
 
     def build(self, block: Any) -> Echo:
-        """Return what gives the rain's RCS, 0 without rain."""
+        """Return a function for the rain's RCS in each cell, 0 without rain."""
         p = block.p
         rain = self.verdict(block).simulated
         if rain and p.pulses_summed > 1 and p.clutter_threshold == "noise":
@@ -163,7 +163,7 @@ class SidelobeClutter(Effect[Echo]):
         return Verdict(True, f"sidelobe_level_db is {level_db:g}")
 
     def build(self, block: Any) -> Echo:
-        """Return what gives the RCS in the sidelobes, 0 where there is none."""
+        """Return a function for the RCS of clutter in the sidelobes, 0 where there is none."""
         return SidelobeEcho(block) if self.verdict(block).simulated else NoEcho(block)
 
 
@@ -268,13 +268,13 @@ class FoldedEcho(Echo):
         self._per_m = float(rain_reflectivity_of(block, rate)) if rains else 0.0
 
     def __call__(self, cells: Any) -> FloatArray:
-        """Return it for the PRFs that decide, m²."""
+        """Return the folded clutter's RCS for the PRFs that decide, m²."""
         each = np.stack([self._echo_at_prf(cells, prf_hz)[0] for prf_hz in self.block.p.prfs_hz])
         needed: int = self.block.p.prfs_needed or len(each)
         return np.asarray(np.sort(each, axis=0)[needed - 1])
 
     def _echo_at_prf(self, cells: Cells, prf_hz: float) -> tuple[FloatArray, FloatArray]:
-        """Return what one PRF hears, m², and at which range most of it is."""
+        """Return the folded clutter at one PRF, m², and the range of most of it."""
         total, most, where = np.zeros(len(cells)), np.zeros(len(cells)), np.array(cells.range_m)
         for other_m in ambiguous_ranges_m(cells.range_m, unambiguous_range_m(prf_hz), _FARTHEST_M):
             heard = np.isfinite(other_m) & (other_m >= self._nearest_m)

@@ -245,7 +245,7 @@ class SeemingRange(Protocol):
     """Gives the ranges that echoes seem to come from."""
 
     def __call__(self, range_m: FloatArray, /) -> FloatArray:
-        """Return them for true ones, m."""
+        """Return the folded ranges of true ranges, m."""
 
 
 SEEMING_RANGE = Hook("seeming range", SeemingRange, "range that an echo seems to come from, m")
@@ -274,7 +274,7 @@ class RangeFolding(Effect[SeemingRange]):
         return Verdict(True, f"range_folds is true: {p.prfs_needed or count} of {count} PRFs")
 
     def build(self, block: Any) -> SeemingRange:
-        """Return what gives the seeming ranges of true ones."""
+        """Return a function from true to folded ranges."""
         p = block.p
         if not p.range_folds:
             return lambda range_m: range_m

@@ -152,7 +152,7 @@ class CuedLooks(Effect[ConesAhead]):
         return Verdict(True, f"{' and '.join(sources)} cues it")
 
     def build(self, block: Any) -> ConesAhead:
-        """Return what finds targets in cones."""
+        """Return a function that finds targets in cue cones."""
         return ConesAhead()
 
 

@@ -70,7 +70,7 @@ class DeclarationRule(Effect[Judging]):
         return Verdict(True, f"declare_m is {m} and declare_n is {n}")
 
     def build(self, block: Any) -> Declarations:
-        """Return what judges the looks of this sensor; 1 of 1 where it has no rule."""
+        """Return the declaration rule of this sensor, 1 of 1 by default."""
         if block.p.declares_by == "place":  # built all the same, it declares whatever is reported
             return Declarations(1, 1)
         return Declarations(block.p.declare_m or 1, block.p.declare_n or 1)
@@ -160,7 +160,7 @@ class SeenPlaces:
         return SeenPlaces(*(values[which] for values in vars(self).values()))
 
     def append(self, later: SeenPlaces) -> SeenPlaces:
-        """Return these and later ones."""
+        """Return the places with later ones appended."""
         both = zip(vars(self).values(), vars(later).values(), strict=True)
         return SeenPlaces(*(np.concatenate(pair) for pair in both))
 

@@ -212,7 +212,7 @@ class SensorGrid:
         self.variances = {VARIANCE_OF[name]: variance_of_step(step) for name, step in steps.items()}
 
     def __call__(self, cells: Any, detected: Any, look: Any, true: Values) -> Measured:
-        """Return what is measured of true values by quantity, as `ErrorModel` does."""
+        """Return measured values of true ones by quantity, as `ErrorModel` does."""
         return self.measure_noise(true)
 
     def measure_noise(self, where: Values, signal: Any = None, drawn: Any = None) -> Measured:

@@ -188,7 +188,7 @@ class Cells:
         return getattr(self._targets, name).take(self._flat // self._width)
 
     def own_belief(self, name: str) -> FloatArray:
-        """Return what the ownship believes of itself, for each cell; see `RelativeTargets`."""
+        """Return the ownship's believed pose for each cell; see `RelativeTargets`."""
         believed = self._targets.believed
         if believed is None:
             raise ValueError("a block on the way does not say what the ownship believes of itself")
@@ -217,7 +217,7 @@ class Cells:
 
     @cached_property
     def equipage_rows(self) -> IntArray:
-        """Where each cell's target stands in the roster's equipage, as it is then."""
+        """Return the row in the roster's equipage of each cell's target at its instant."""
         return self.roster.equipage_rows(self.craft, self.state_ns)
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
@@ -242,7 +242,7 @@ class CellValues(Protocol):
     """Gives one number for each cell: a factor, a cross-section, an area."""
 
     def __call__(self, cells: Cells, /) -> FloatArray:
-        """Return them, (cells,)."""
+        """Return the values, (cells,)."""
 
 
 def values_of(block: Component, built: CellValues, cells: Cells) -> FloatArray:

@@ -103,7 +103,7 @@ class ErrorModel:
         }
 
     def __call__(self, cells: Cells, detected: IntArray, look: Look, true: Values) -> Measured:
-        """Return what is measured of the `detected` cells, and its variances by column.
+        """Return measured values of the `detected` cells, and their variances by column.
 
         `true` is the truth by quantity, in the sensor's axes.
         """
@@ -237,7 +237,7 @@ def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
 
 
 def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError]:
-    """Return what of a sensor's errors lasts from look to look, by quantity."""
+    """Return the sensor errors that last from look to look, by quantity."""
     lasting = {}
     for name, stated in p.stated_errors(steps).items():
         bias = stated.mean_bias_square

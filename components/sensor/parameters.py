@@ -126,7 +126,7 @@ class ErrorParameters(ClockedParameters):
         return f"{name}_error_{unit}", f"{name}_bias_{unit}", f"{name}_correlation_time_s"
 
     def stated_errors(self, steps: Mapping[str, float]) -> dict[str, StatedError]:
-        """Return what the scene states of quantities with these steps of the grid.
+        """Return the errors that the scene states for quantities with these grid steps.
 
         Nothing of a quantity for which a user's sensor has no such parameters.
         """

@@ -215,7 +215,7 @@ class Sensor(Measuring):
         return bool(record is not None and record.looks)
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: every look too, where the scene asks for it."""
+        """Return the recorded message types: every look too, where the scene has that."""
         return [self._message, EveryLook] if self._is_asked_for_looks else [self._message]
 
     @cached_property
@@ -322,7 +322,7 @@ class Sensor(Measuring):
         return detections
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
-        """Return what is recorded of each cell beside its detection."""
+        """Return the recorded columns of each cell beside its detection."""
         if self._cue_cones is None:
             return look.extras
         return {**look.extras, "cued": cells.is_cued()}

@@ -305,7 +305,7 @@ class Active(CooperativeSensor):
     def reported_altitude_m(
         self, cells: Cells, which: AnyArray, altitude_m: FloatArray
     ) -> FloatArray:
-        """Return what some cells' transponders report of true altitudes, m."""
+        """Return the altitudes that cells' transponders report for true altitudes, m."""
         step_ft = self._mode_step_ft(cells, which) if self._errs else 0.0
         transponders = Transponders.from_cells(cells, which)
         altitude_m = self.altimeter_m(altitude_m)

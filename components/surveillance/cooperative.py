@@ -112,7 +112,7 @@ class CooperativeSensor(Sensor):
         return scene_air(self.context.sections)
 
     def altimeter_m(self, height_m: FloatArray) -> FloatArray:
-        """Return what altimeters read at heights, but for their errors, m."""
+        """Return altimeter readings at heights without the instruments' errors, m."""
         if self._air is None:
             return height_m
         return np.asarray(self._air.pressure_altitude_m(height_m))

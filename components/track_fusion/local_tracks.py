@@ -55,7 +55,7 @@ class LocalTracks(KeyedTable):
         return motion.predict(self.state, self.covariance, time_s - self.time_s)
 
     def copy_systems(self, old: Self) -> Self:
-        """Return them with the fused tracks that they belonged to before."""
+        """Return the tracks with the fused tracks that they belonged to before."""
         if len(old) == 0 or len(self) == 0:
             return self
         known = old.key()

@@ -46,7 +46,7 @@ class Bearing:
 
 
 def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Bearing:
-    """Return what the directions of tracks say of states (6, n) at instants (n,)."""
+    """Return how the tracks' directions constrain states (6, n) at instants (n,)."""
     back_s = tracks.time_s - time_s
     then = state.copy()
     then[:3] += back_s * state[3:]

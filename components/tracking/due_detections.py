@@ -49,7 +49,7 @@ class Promises:
 
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...], ticks_per_s: int) -> Self:
-        """Return those of the sensors."""
+        """Return the promises of some sensors."""
         known = (offers.get(name) for name in sensors)
         steps = tuple(one.promises if isinstance(one, SensorOffer) else () for one in known)
         return cls(steps, ticks_per_s)

@@ -238,7 +238,7 @@ class LookCount:
     def add_looks(
         self, sensors: tuple[str, ...], looks: Scans, came: slice, left_out: IntArray | list[int]
     ) -> "LookCount":
-        """Return the count with more of some looks: those that came, and those left out."""
+        """Return the count with more looks added: those that came, and those left out."""
 
         def runs_of(some: slice | IntArray | list[int], sensor: int) -> IntArray:
             return looks.run[some][(looks.sensors[some] >> sensor & 1).astype(bool)]

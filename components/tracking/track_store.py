@@ -96,7 +96,7 @@ class TrackStore(KeyedTable):
         return self.concatenate([self, ended]).sorted_by_key()
 
     def estimates(self) -> Estimates:
-        """Return what the filter knows of the tracks."""
+        """Return the filter's estimates of the tracks."""
         return Estimates(self.states(), self.covariances(), self.weights)
 
     def replace_estimates(self, estimates: Estimates, **columns: Any) -> Self:

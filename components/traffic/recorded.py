@@ -35,7 +35,7 @@ _RADIANS = ("latitude", 1.6, "longitude", 3.2)
 
 
 def describe_suspicions(aircraft: Sequence[SampledTrajectory]) -> list[str]:
-    """Return what is suspicious about the flights of a file, one sentence for each kind."""
+    """Return a sentence for each kind of suspicious motion in a file's flights."""
     by_hint: dict[str, list[str]] = {}
     for craft in aircraft:
         for what, hint in _describe_aircraft(craft):

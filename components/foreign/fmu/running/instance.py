@@ -106,7 +106,7 @@ class Instance:
         self.log.append(message.decode(errors="replace").strip())
 
     def words(self) -> str:
-        """Return what it logged last, to be added to an error."""
+        """Return the FMU's last log messages, to be added to an error."""
         return f": {' | '.join(list(self.log)[-3:])}" if self.log else ""
 
     def refuse(self, call: str, status: int) -> None:
