@@ -15,7 +15,7 @@ from components.guidance.daidalus import (
     smaller,
 )
 from components.messages.alerts import AlertLevels
-from components.messages.detections import without_range
+from components.messages.detections import describe_rangeless
 from components.messages.steering import (
     SLOWEST_TURN_DEG_S,
     ChosenSides,
@@ -134,7 +134,7 @@ class TurnOut(Component):
                 )
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: sides only where it tells them."""
+        """Return the recorded message types: chosen sides only where they are sent."""
         return [Manoeuvres] if self.p.address is None else [*super().records()]
 
     def offer(self, port: str) -> int | None:
@@ -256,7 +256,7 @@ class TurnOut(Component):
         return smaller(changes) if self._is_free(run, tick) else None
 
     def _manoeuvre(self, change: float) -> Manoeuvre:
-        """Return what makes a change."""
+        """Return the manoeuvre that makes a change."""
         conf = self._configuration
         if self.p.manoeuvre == "climb":
             beyond_m = math.copysign(self.p.beyond_m, change)
@@ -351,7 +351,7 @@ class TurnAway(Component):
 
     def warnings(self) -> list[str]:
         """Warn that no sensor measures the range that it needs."""
-        blind = "" if self.p.without_range else without_range(self.context.producers)
+        blind = "" if self.p.without_range else describe_rangeless(self.context.producers)
         if not blind:
             return []
         return [f"without_range is false and {blind} measures no range: it never turns"]

@@ -261,7 +261,7 @@ class Roster:
         every = [*self.aircraft, *(one for _, then in self.later for one in then.aircraft)]
         return Equipage.from_aircraft(every, np.tile(self.keys, len(every) // max(1, len(self))))
 
-    def equipped(self, craft: IntArray, instant_ns: IntArray) -> IntArray:
+    def equipage_rows(self, craft: IntArray, instant_ns: IntArray) -> IntArray:
         """Return the rows of `equipage` for some of the aircraft at instants of the run."""
         if not self.later:
             return craft

@@ -110,7 +110,7 @@ class _AirColumn:
         return np.asarray(self._base_drop[layer] + self._pressure_drop(layer, above_m))
 
     def _pressure_drop(self, layer: IntArray, height_m: FloatArray) -> FloatArray:
-        """Return by how much it falls from the bases of layers to heights above these."""
+        """Return the drop of log pressure from the bases of layers to heights above them."""
         lapse, kelvin = self._lapse_k_m[layer], self._base_k[layer]
         even = np.where(lapse == 0.0, 1.0, lapse)
         falling = -_HYDROSTATIC_K_M / even * np.log1p(-lapse * height_m / kelvin)

@@ -295,7 +295,7 @@ class ConnectionLimit:
         self._said = self._starved = False
 
     def make_connection(self, *given: Any, **options: Any) -> ServerConnection:
-        """Return what `websockets.asyncio.server.serve` makes of a new connection."""
+        """Return a connection object for `websockets.asyncio.server.serve` that is limited."""
         return _Limited(self, *given, **options)
 
     def count_opened(self) -> bool:

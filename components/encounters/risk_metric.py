@@ -196,12 +196,12 @@ class RiskRatios(Mitigated):
         return result
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return what no manoeuvre changes, and the geometry of the closest approach."""
+        """Return the results that no manoeuvre changes, and the closest approach's geometry."""
         meeting, sizes_m = meetings_in_plane(group, self.p), self.p.sizes_m
         if meeting is None:
             result = self._nominal_events(group)
             geometry = partial(nominal_geometry, widen_cylinders(sizes_m))
-            closest, *misses_m = np.split(self.of_flights(group, geometry, steered=False), [7, 9])
+            closest, *misses_m = np.split(self.read_flights(group, geometry, steered=False), [7, 9])
         else:
             closest, result = meeting.closest, self._meeting_events(meeting)
             misses_m = [meeting.beside_m, meeting.above_m]
@@ -261,7 +261,7 @@ class RiskRatios(Mitigated):
         """Return the classes of encounters, as without manoeuvres."""
         if not self.p.by:
             return {}
-        return self._class_columns(*self.of_flights(group, meeting_deg, steered=False))
+        return self._class_columns(*self.read_flights(group, meeting_deg, steered=False))
 
     def _class_columns(
         self, course_deg: FloatArray, bearing_deg: FloatArray

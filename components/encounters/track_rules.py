@@ -73,7 +73,7 @@ class Commands:
     turn_rad_s: FloatArray
 
     def take(self, rows: IntArray) -> "Commands":
-        """Return those of some tracks."""
+        """Return the commands of some tracks."""
         return Commands(*(values.take(rows, axis=-1) for values in vars(self).values()))
 
     def fly(self, dynamics: str) -> FlownTracks:
@@ -137,7 +137,7 @@ class TrackRules:
         return result
 
     def commands(self, tracks: SampledTracks) -> Commands:
-        """Return what tracks command, in feet and seconds."""
+        """Return the commands of tracks, in feet and seconds."""
         return Commands(
             self.altitude_ft(tracks),
             tracks.initial[self._index_of(SPEED)] * FT_S_PER_KT,

@@ -38,7 +38,7 @@ class Kind:
 
 
 def expected_measurement(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
-    """Return what would be measured without error."""
+    """Return the measurement without error."""
     away = state[:3] - pose.position_m
     x, y, z = times(pose.to_body, away)
     seen = np.empty((kind.size, state.shape[-1]))
@@ -58,7 +58,7 @@ def expected_measurement(kind: Kind, state: FloatArray, pose: SensorPose) -> Flo
 
 
 def linearise(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatArray, FloatArray]:
-    """Return what would be measured, and its derivative by position and velocity."""
+    """Return the measurement without error, and its derivative by position and velocity."""
     away = state[:3] - pose.position_m
     turned = pose.to_body
     x, y, z = times(turned, away)

@@ -160,7 +160,7 @@ def _apply_polar_change(
     covariance: FloatArray,
     sensor_m: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what a change of polar coordinates makes of state and covariance."""
+    """Return state and covariance after a change of polar coordinates."""
     row = to_polar[2:3]
     spread = multiply_by_transpose(product(row, covariance[:6, :6]), row)[0, 0]
     least = np.maximum(_LEAST * np.sqrt(np.maximum(spread, 0.0)), 1.0 / _FARTHEST_M)

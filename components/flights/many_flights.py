@@ -131,7 +131,7 @@ class SteeredFleet(Growing, Fleet):
         return SteeredFlight(self._flights[ownship], self, ownship)
 
     def parts_of(self, ownship: int) -> Parts:
-        """Return what an ownship flies after its manoeuvres."""
+        """Return the parts of an ownship's flight after its manoeuvres."""
         count = int(self.manoeuvre_count[ownship])
         starts_s, numbers = self._start_s[ownship, :count], self._part[ownship, :count]
         return tuple(zip(starts_s.tolist(), map(self._flight_of, numbers.tolist()), strict=True))

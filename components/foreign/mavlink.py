@@ -16,7 +16,7 @@ from components.estimation.frame import vectors_in_frame
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
 from components.geometry import POSITION_FIELDS, enu_to_geodetic, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
-from components.messages.detections import without_range
+from components.messages.detections import describe_rangeless
 from components.messages.state_tracks import COASTED, CONFIRMED, STALE_S, StateTracks
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
@@ -179,7 +179,7 @@ class Mavlink(Component):
 
     def warnings(self) -> list[str]:
         """Warn that no sensor measures range: tracks without one are not sent."""
-        blind = without_range(one for one in self.context.producers if one.port == "estimates")
+        blind = describe_rangeless(one for one in self.context.producers if one.port == "estimates")
         return [f"{blind} measures no range: no track is sent"] if blind else []
 
     def undone(self) -> dict[str, tuple[int, int]]:

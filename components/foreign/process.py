@@ -141,7 +141,7 @@ class Process(Component):
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
-        """Return when it is called without being sent anything, if it is."""
+        """Return the clock by which the program is called without input, if any."""
         rate = parameters.scan_rate_hz
         return None if rate is None else ClockSpec(rate, parameters.offset_s)
 
@@ -273,7 +273,7 @@ class Process(Component):
         return self._roster or Roster.from_pairs([])
 
     def undone(self) -> dict[str, tuple[int, int]]:
-        """Return how often it was asked, where it never had anything to say."""
+        """Return how often the program was called, where it never answered with a row."""
         if self._answers or not self._calls:
             return {}
         return {"it was asked and answered with no row": (self._calls, self._calls)}

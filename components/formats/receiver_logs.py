@@ -17,7 +17,7 @@ from typing import Any
 
 from components.arguments.units import FOOT_M, KNOT_M_S
 from components.formats.reports import Log, PositionReport
-from components.formats.text_rows import Problems, each_line, text_of
+from components.formats.text_rows import Problems, iterate_lines, text_of
 
 _FPM = FOOT_M / 60.0
 #: How old a velocity message of SBS may be beside a position, s.
@@ -359,7 +359,7 @@ _JSON: tuple[tuple[frozenset[str], str, str, _Reader], ...] = (
 def _read_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Reports:
     """Join the messages of each aircraft: positions with the last velocity, if it is recent."""
     moves: dict[str, tuple[float, tuple[Any, ...]]] = {}
-    lines = each_line(text_of(data, problems))
+    lines = iterate_lines(text_of(data, problems))
     del data
     days: dict[str, float | None] = {}
     for number, line in lines:

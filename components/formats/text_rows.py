@@ -180,7 +180,7 @@ def read_lines(
     `needed` and `holds` are for the messages of a binary and of an empty file. Text may be as
     `text_of` says; lines may end in LF, CR LF or CR.
     """
-    lines = each_line(text_of(read_content(path, problems), problems, needed))
+    lines = iterate_lines(text_of(read_content(path, problems), problems, needed))
     rows = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
     if not rows:
         problems.fail(f"the file is empty: {holds} are needed")
@@ -224,7 +224,7 @@ def text_of(data: bytes, problems: Problems, needed: str = _TRAFFIC) -> str:
 _LINE = re.compile(r"[^\r\n]+|\r\n|\r|\n")
 
 
-def each_line(text: str) -> Iterator[tuple[int, str]]:
+def iterate_lines(text: str) -> Iterator[tuple[int, str]]:
     """Yield the lines that are not blank, numbered from 1, as they are wanted."""
     number = 1
     for match in _LINE.finditer(text):
@@ -290,7 +290,7 @@ def cells(line: str, count: int, name_column: int) -> list[str] | int:
 _FRAME, _HEAD = re.compile(r"[+|]?-[-+]+-[+|]?"), 30
 
 
-def without_frame(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+def strip_frame(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
     """Yield the rows of a table framed by a shell (Impala, Trino), its header once."""
     head = list(islice(lines, _HEAD))
     names = ""

@@ -123,9 +123,11 @@ class Fusion(Component):
         """Return how old a detection may be to be fused with a new one, s."""
         raise TypeError(f"{type(self).__name__} states no window")
 
-    def with_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
+    def merge_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
         """Return new and recent rows of every sensor, and keep what the next run may need."""
-        together, self._recent = self._recent.with_new(arrivals, wake.first_run, self.keep_ticks)
+        together, self._recent = self._recent.add_arrivals(
+            arrivals, wake.first_run, self.keep_ticks
+        )
         return together
 
     def combine(
@@ -147,7 +149,7 @@ class Fusion(Component):
         target : (fused,) of int
             Of whom each is, an index in the roster; -1 for a false alarm.
         arrivals : dict of Arrivals
-            What came, by sensor; with what came before, as `with_recent` gives it.
+            What came, by sensor; with what came before, as `merge_recent` gives it.
         entries : dict of (fused,) of int
             By sensor, which entry of its message belongs to each fused detection; -1 for none.
         """
@@ -170,7 +172,7 @@ class Fusion(Component):
         """Return what a tracker takes of fused rows: what is new, and of one instant."""
         made = np.concatenate([one.message.measured_ticks() for one in arrivals.values()])
         targets = np.concatenate([one.message.target for one in arrivals.values()])
-        used = self._recent.were_used(arrivals)
+        used = self._recent.find_used(arrivals)
         row = fused.row_of_entries
         whole, at, alone = split_used_rows(row, parts, made, used)
         used[parts[parts >= 0]] = True

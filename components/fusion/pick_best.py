@@ -82,7 +82,7 @@ class PickBest(Fusion):
         row = union // width
         target = union - row * width
         if self.gate_ticks:
-            arrivals = self.with_recent(arrivals, wake)
+            arrivals = self.merge_recent(arrivals, wake)
             entries = {
                 name: latest_in_gate(new, wake.instants.take(row), target, self.gate_ticks)
                 for name, new in arrivals.items()

@@ -234,7 +234,7 @@ def sensor_offers(producers: Iterable[Any]) -> dict[str, Any]:
     return offers
 
 
-def without_range(producers: Iterable[Any]) -> str:
+def describe_rangeless(producers: Iterable[Any]) -> str:
     """Return who leads to some blocks, where no sensor among them measures range; else nothing."""
     offers = sensor_offers(producers)
     if not offers or any(

@@ -25,9 +25,9 @@ from components.environment.tables import Weather
 from components.optical.contrast import CONTRAST, visibility_transmission
 from components.sensor.look import Cells, CellValues
 from components.sensor.weather_cells import (
+    cells_on_lines,
     cells_verdict,
     heights_within,
-    on_the_way,
     weather_cells,
 )
 from dsa_des.arrays.types import FloatArray
@@ -128,7 +128,7 @@ class ObscuringCells(Effect[CellValues]):
 
         def factor(cells: Cells) -> FloatArray:
             depth = np.zeros(len(cells))
-            for one, within in on_the_way(block, cells):
+            for one, within in cells_on_lines(block, cells):
                 ends_m = heights_within(cells, within)
                 low, high = np.minimum(*ends_m), np.maximum(*ends_m)
                 rain = share_between(low, high, -math.inf, weather.rain_top_m)
@@ -143,7 +143,7 @@ class ObscuringCells(Effect[CellValues]):
 
 
 def _fog_per_m(block: Any, water_g_m3: float) -> float:
-    """Return what fog takes of visible light, of an infrared band or of a laser's, 1/m."""
+    """Return the extinction by fog of visible light, an infrared band or a laser, 1/m."""
     visibility_m = float(fog_visibility_m(water_g_m3))
     if math.isinf(visibility_m):
         return 0.0

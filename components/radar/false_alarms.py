@@ -107,7 +107,7 @@ class NoiseReports:
         rate = places.uniform(key, scan, 4)
         snr = np.maximum(snr, FAINTEST)
         cued = bool(which) if len(self._crossings) > 1 else None
-        return self._block.with_noise_reports(
+        return self._block.add_noise_reports(
             detections, targets, rows, row, where, key=key, snr=snr, rate=rate, cued=cued
         )
 
@@ -195,7 +195,7 @@ class GroundReports:
     @cached_property
     def _body(self) -> Vector:
         """Where the beams truly point in body axes; the sensor's are known once all is built."""
-        x, y, z = unit_vector(*self._block.axes.pointing(*self._beams))
+        x, y, z = unit_vector(*self._block.axes.true_direction(*self._beams))
         return x, y, z
 
     def __call__(
@@ -224,7 +224,7 @@ class GroundReports:
         beyond = -np.log1p(-draws.uniform(key, scan, 4)) * (1.0 + cnr)
         snr = np.maximum(beyond + self._crossing.threshold - 1.0, FAINTEST)
         rate = draws.uniform(key, scan, 5)
-        joined = self._block.with_noise_reports(
+        joined = self._block.add_noise_reports(
             detections, targets, rows, row, where, key=key + _OF_GROUND, snr=snr, rate=rate
         )
         # Without any here, the report is in that order already.
@@ -340,7 +340,7 @@ HIGH_FALSE_ALARM_PROBABILITY = 0.01
 NO_FALSE_ALARMS_PER_SCAN = 1e-6
 
 
-def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
+def high_pfa_warnings(parameters: Any, snr_db: float) -> list[str]:
     """Return a warning if the Pfa is so high that echoes below the noise are detected."""
     pfa = parameters.false_alarm_probability
     if pfa < HIGH_FALSE_ALARM_PROBABILITY or not math.isfinite(snr_db):
@@ -353,7 +353,7 @@ def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
     ]
 
 
-def unlikely_false_alarms(block: Any) -> list[str]:
+def false_alarm_count_warnings(block: Any) -> list[str]:
     """Return a sentence on the number of false alarms, if that is large or practically 0."""
     if not (block.p.false_alarms and block.p.enabled):
         return []

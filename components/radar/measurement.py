@@ -227,7 +227,7 @@ def _is_chosen(cells: IntArray, chosen: IntArray, count: int) -> IntArray:
     return np.flatnonzero(inside[cells])
 
 
-def noise_at_targets(parameters: Any) -> list[str]:
+def noise_report_warnings(parameters: Any) -> list[str]:
     """Return a warning where noise detections are reported exactly at the target."""
     steps = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
     exact = [step for step in steps if getattr(parameters, step) == 0]
@@ -251,7 +251,7 @@ class OwnVelocity(Effect[ReportTransform]):
     outside_the_proof = "it fills columns that are null without it"
 
     def build(self, block: Any) -> ReportTransform:
-        """Return what adds the velocity to a report."""
+        """Return a function that adds the own velocity to a report."""
         ticks_per_s = block.context.ticks_per_s
 
         def with_velocity(

@@ -14,7 +14,7 @@ from components.radar.link_budget import (
     LinkBudget,
     calibrated_bandwidth,
     gain_of_beam_db,
-    implausible,
+    implausible_value_warnings,
 )
 from components.radar.measurement import check_signal_errors
 from components.radar.resolution import ResolutionParameters
@@ -385,12 +385,12 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
             )
         except ValueError as error:
             # What follows from a carrier of 24 Hz must not be blamed on the range.
-            wrong = implausible(self)
+            wrong = implausible_value_warnings(self)
             raise ValueError("; ".join([*wrong, str(error)])) from error
         return replace(budget, bandwidth_hz=bandwidth_hz)
 
 
-def moved_threshold(p: LinkBudgetParameters) -> list[str]:
+def moved_threshold_warnings(p: LinkBudgetParameters) -> list[str]:
     """Return a sentence with Pd at a calibration's range, where the threshold differs."""
     known, stated, now = p.calibrate, p.calibrated_pfa, p.false_alarm_probability
     if known is None or stated == now:

@@ -12,7 +12,7 @@ from components.radar.detection.ladder import PD_METHOD, ExactDetection, method_
 from components.radar.detection.probability import detection_probability, probability_of_cells
 from components.radar.detection.threshold import Crossing
 from components.radar.ground_clutter import Clutter, terrain_of
-from components.radar.measurement import noise_at_targets, signal_over_clutter
+from components.radar.measurement import noise_report_warnings, signal_over_clutter
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs import (
     FADING,
@@ -182,7 +182,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
     def left_out(self) -> list[str]:
         """Return a sentence on the chosen Pd method and its reason, where the scene has `auto`."""
-        said = [*super().left_out(), *noise_at_targets(self.p)]
+        said = [*super().left_out(), *noise_report_warnings(self.p)]
         return said if self.p.model is None else [*said, *method_reasons(self, self._method)]
 
     def warnings(self) -> list[str]:

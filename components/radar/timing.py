@@ -319,7 +319,7 @@ class TimeBudget(Effect[LookEnergy]):
         )
 
     def build(self, block: Any) -> LookEnergy:
-        """Return what a look consists of."""
+        """Return the pulses and energy of a look."""
         look: LookEnergy = block.p.look_energy
         return look
 

@@ -108,12 +108,14 @@ class ConesAhead:
         if self._cones is None or not len(false):
             return detections
         row = detections.row_of_entries[false]
-        inside = self.in_cones(row, detections.azimuth_rad[false], detections.elevation_rad[false])
+        inside = self.is_in_cones(
+            row, detections.azimuth_rad[false], detections.elevation_rad[false]
+        )
         cued = detections.extras["cued"].copy()
         cued[false[inside]] = True
         return replace(detections, extras={**detections.extras, "cued": cued})
 
-    def in_cones(
+    def is_in_cones(
         self, row: IntArray, azimuth_rad: FloatArray, elevation_rad: FloatArray
     ) -> BoolArray:
         """Return which directions in body axes lie in a cone of their row in the last call."""
@@ -150,7 +152,7 @@ class CuedLooks(Effect[ConesAhead]):
         return Verdict(True, f"{' and '.join(sources)} cues it")
 
     def build(self, block: Any) -> ConesAhead:
-        """Return what finds targets in cones."""
+        """Return a function that finds targets in cue cones."""
         return ConesAhead()
 
 

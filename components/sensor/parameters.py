@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from components.geometry import TWO_PI, rising_sector
+from components.geometry import TWO_PI, unwrap_sector
 from components.messages.reach import Reach
 from components.sensor.grid import Grid, variance_of_step
 from dsa_des.block.component import ClockedParameters
@@ -126,7 +126,7 @@ class ErrorParameters(ClockedParameters):
         return f"{name}_error_{unit}", f"{name}_bias_{unit}", f"{name}_correlation_time_s"
 
     def stated_errors(self, steps: Mapping[str, float]) -> dict[str, StatedError]:
-        """Return what the scene states of quantities with these steps of the grid.
+        """Return the errors that the scene states for quantities with these grid steps.
 
         Nothing of a quantity for which a user's sensor has no such parameters.
         """
@@ -199,7 +199,7 @@ def clockwise_azimuths(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
-def rising_elevations(value: tuple[float, float]) -> tuple[float, float]:
+def check_elevations(value: tuple[float, float]) -> tuple[float, float]:
     """Return a field of view in elevation, deg; refuse one that is none."""
     if not -90 <= value[0] < value[1] <= 90:
         raise ValueError("must hold two angles in [-90, 90], the lower one first")
@@ -225,7 +225,7 @@ class SensorParameters(ErrorParameters):
         default=(-180.0, 180.0),
         description="Field of view in azimuth, clockwise from the first to the second, deg.",
     )
-    elevation_deg: Annotated[tuple[float, float], AfterValidator(rising_elevations)] = Field(
+    elevation_deg: Annotated[tuple[float, float], AfterValidator(check_elevations)] = Field(
         default=(-90.0, 90.0), description="Field of view in elevation, lowest and highest, deg."
     )
     range_km: float | None = Field(
@@ -290,7 +290,7 @@ class SensorParameters(ErrorParameters):
     def _grid_meets_field(self) -> Self:
         reach = self.reach()
         for angle, (low, high) in (
-            ("azimuth", rising_sector(*reach.azimuth_rad)),
+            ("azimuth", unwrap_sector(*reach.azimuth_rad)),
             ("elevation", reach.elevation_rad),
         ):
             step_deg = getattr(self, f"{angle}_resolution_deg")

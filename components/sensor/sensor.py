@@ -34,9 +34,9 @@ from components.sensor.look import DECLARATION, STRENGTH, Cells, Judging, Look, 
 from components.sensor.measurement_errors import (
     MEASUREMENT,
     MeasurementErrors,
+    add_error_parts,
     constant_variances,
     lasting_errors,
-    with_parts,
 )
 from components.sensor.measuring import Measuring
 from components.sensor.mounting import AXES, Mounting
@@ -175,7 +175,7 @@ class Sensor(Measuring):
         constant: dict[str, Any] = constant_variances(self.p, self.steps)
         lasting = lasting_errors(self.p, self.steps)
         if Glint().verdict(self).simulated:
-            lasting = with_parts(lasting, Glint().build(self).lasting())
+            lasting = add_error_parts(lasting, Glint().build(self).lasting())
         reach = self.stated_reach
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
             constant = {**constant, AZIMUTH: None, ELEVATION: None}
@@ -190,7 +190,7 @@ class Sensor(Measuring):
         noise = navigation_noise(self.context)
         if self.turned_by_belief and any(map(any, noise)):  # differs with the pose
             unstated_m2 = 0.0 if self.measures_range else max(noise[0]) ** 2
-            lasting = with_parts(lasting, lasting_navigation(self.context))
+            lasting = add_error_parts(lasting, lasting_navigation(self.context))
             constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}
         return SensorOffer(
             self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,
@@ -215,7 +215,7 @@ class Sensor(Measuring):
         return bool(record is not None and record.looks)
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: every look too, where the scene asks for it."""
+        """Return the recorded message types: every look too, where the scene has that."""
         return [self._message, EveryLook] if self._is_asked_for_looks else [self._message]
 
     @cached_property
@@ -322,7 +322,7 @@ class Sensor(Measuring):
         return detections
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
-        """Return what is recorded of each cell beside its detection."""
+        """Return the recorded columns of each cell beside its detection."""
         if self._cue_cones is None:
             return look.extras
         return {**look.extras, "cued": cells.is_cued()}

@@ -110,7 +110,7 @@ class CooperativeSensor(Sensor):
         return scene_air(self.context.sections)
 
     def altimeter_m(self, height_m: FloatArray) -> FloatArray:
-        """Return what altimeters read at heights, but for their errors, m."""
+        """Return altimeter readings at heights without the instruments' errors, m."""
         if self._air is None:
             return height_m
         return np.asarray(self._air.pressure_altitude_m(height_m))
@@ -166,7 +166,7 @@ class CooperativeSensor(Sensor):
             if name not in names:
                 raise ValueError(f"leaves_out: there is no {name!r}{did_you_mean(name, names)}")
 
-    def of_others(self, cells: Cells, heard: BoolArray, address: IntArray) -> BoolArray:
+    def is_of_others(self, cells: Cells, heard: BoolArray, address: IntArray) -> BoolArray:
         """Return which received cells are not of an aircraft that is left out by its address."""
         roster = cells.roster
         for name in self.p.leaves_out:

@@ -201,7 +201,7 @@ class PositionFields:
 
 
 def position_fields(messages: Bytes) -> PositionFields:
-    """Return what airborne position messages hold."""
+    """Return the fields of airborne position messages."""
     code, supplement = _field(messages, 32, 5), _field(messages, 39, 1)
     nic = np.full(len(messages), -1)
     for category, both in _TYPE_OF_NIC.items():

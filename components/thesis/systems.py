@@ -54,7 +54,7 @@ class Errors:
 
 
 def _tecvol_errors(printed: Cells) -> tuple[list[Row], Picture, Columns]:
-    """Return what its sensors and its navigation err: rows, the figure and its data."""
+    """Return TECVOL's errors of sensors and navigation: rows, the figure and its data."""
     loaded = scene("systems/tecvol")
     runs, flights = monte_carlo(loaded, REPLICAS), flights_of(Simulation(loaded))
     errors = {name: _errors(runs, flights, name) for name in ("radar", "eo")}
@@ -141,7 +141,7 @@ def _errors(runs: list[ThesisRecording], flights: Flights, name: str) -> Errors:
 
 
 def _join_own_position(run: ThesisRecording, name: str) -> dict[str, Any]:
-    """Return what a sensor detected, and where the ownship believed to be then."""
+    """Return a sensor's detections with the believed own position of each."""
     result, scans = run.rows("detections", block=name), run.rows("scans", block=name)
     row = np.searchsorted(scans["tick"], result["tick"])
     return {**result, **{key: scans[key][row] for key in _PLACE}}

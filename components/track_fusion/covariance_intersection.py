@@ -22,13 +22,13 @@ from components.track_fusion.local_tracks import (
     LocalTracks,
     local_tracks,
     records_of,
-    with_newest,
+    update_newest,
 )
 from components.track_fusion.track_association import (
     MatchRules,
+    drop_strays,
     leaders,
     match_tracks,
-    without_strays,
 )
 from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.run_ticks import last_of_run
@@ -278,18 +278,18 @@ class CovarianceIntersection(Component):
         replica: IntArray,
     ) -> tuple[LocalTracks, KeyedTable]:
         """Return what trackers hold after the reports of some rows, one of each replica."""
-        new = new.with_systems_of(local)
+        new = new.copy_systems(local)
         gone = np.zeros(len(local), dtype=bool)
         for index, rows in enumerate(reported_at):
             gone |= (local.tracker == index) & np.isin(local.replica, replica[np.isin(at, rows)])
         local = LocalTracks.concatenate([local.take(~gone), new])
-        records = with_newest(records, new, self._on_board)
+        records = update_newest(records, new, self._on_board)
         when = records.time_s[np.searchsorted(records.replica, local.replica)]
         now = np.isin(local.replica, replica)
         silent = now & (when - local.updated_s > self.p.drop_after_s)
         idle, busy, when = local.take(~now), local.take(now & ~silent), when[now & ~silent]
         if len(busy):
-            busy = without_strays(self._rules, busy, when)
+            busy = drop_strays(self._rules, busy, when)
             busy, next_number = match_tracks(
                 self._rules, busy, when, len(self.trackers), records.next_number, records.replica
             )

@@ -139,7 +139,7 @@ def initiate_tracks(
 def start_estimates(
     rules: TrackerRules, scans: Scans, pose: SensorPose, codes: IntArray, detection: IntArray
 ) -> Estimates:
-    """Return what is known of a target by one detection alone, of several kinds `codes`."""
+    """Return initial estimates from one detection each, of several kinds `codes`."""
     count = len(detection)
     measured, variance = (
         select_tracks(scans.measured[:3], detection),

@@ -235,10 +235,10 @@ class LookCount:
     #: By name of the sensor: of each run those left out, and all (2, runs).
     counts: Mapping[str, IntArray] = field(default_factory=dict)
 
-    def with_looks(
+    def add_looks(
         self, sensors: tuple[str, ...], looks: Scans, came: slice, left_out: IntArray | list[int]
     ) -> "LookCount":
-        """Return the count with more of some looks: those that came, and those left out."""
+        """Return the count with more looks added: those that came, and those left out."""
 
         def runs_of(some: slice | IntArray | list[int], sensor: int) -> IntArray:
             return looks.run[some][(looks.sensors[some] >> sensor & 1).astype(bool)]

@@ -41,7 +41,7 @@ class LastingErrors:
 
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "LastingErrors | None":
-        """Return those of the sensors, or None where all errors are new at every look."""
+        """Return lasting errors of sensors, or None where all errors are new at every look."""
         known = {
             (_QUANTITIES.index(quantity), j): one
             for j, name in enumerate(sensors)

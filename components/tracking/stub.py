@@ -63,7 +63,7 @@ class TrackerStub(Component):
         return WITHOUT_POSE
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: where navigation errs, with the pose believed then."""
+        """Return the recorded message types: with the believed pose where navigation errs."""
         return [TracksWithPose] if navigation_errs(self.context) else [*super().records()]
 
     def setup(self) -> None:
@@ -132,7 +132,7 @@ class TrackerStub(Component):
         return self._tracks(fused, wake, updated, targets, last, pool, first)
 
     def _measured_entries(self, wake: Wake) -> tuple[FusedDetections | None, IntArray]:
-        """Return what was measured of targets, and how many entries each row of the wake has."""
+        """Return measurements of targets, and the number of entries of each wake row."""
         busy = wake.without_idle()
         fused = self._nothing if busy is None else busy["fused"]
         counts = np.zeros(len(wake), dtype=np.int64)

@@ -96,10 +96,10 @@ class TrackStore(KeyedTable):
         return self.concatenate([self, ended]).sorted_by_key()
 
     def estimates(self) -> Estimates:
-        """Return what the filter knows of the tracks."""
+        """Return the filter's estimates of the tracks."""
         return Estimates(self.states(), self.covariances(), self.weights)
 
-    def with_estimates(self, estimates: Estimates, **columns: Any) -> Self:
+    def replace_estimates(self, estimates: Estimates, **columns: Any) -> Self:
         """Return the same tracks with other estimates, and other values in some columns."""
         return self.with_columns(**estimate_columns(estimates), **columns)
 

@@ -257,7 +257,7 @@ class Tracker(Component):
             plan, left_out, kept = plan_of_late(
                 scans, of, begin, self._lag_ticks, rerun=self.p.late == "rerun"
             )
-        self._count = self._count.with_looks(fused.sensors, scans, slice(begin, None), left_out)
+        self._count = self._count.add_looks(fused.sensors, scans, slice(begin, None), left_out)
         moves = scans.velocity if self.rules.rates_of else None
         origin = select_tracks(records.origin, of)
         poses = pose_in_frame(origin, scans.pose[:3], scans.pose[3:], moves)
@@ -294,7 +294,7 @@ class Tracker(Component):
                     records.next_number[of_late], unless_updated=self.p.late == "drop",
                 )  # fmt: skip
                 too_late = plan.look[late[gone]]
-                self._count = self._count.with_looks(fused.sensors, scans, slice(0), too_late)
+                self._count = self._count.add_looks(fused.sensors, scans, slice(0), too_late)
             looks, mine = plan.look[works_now], plan.of[works_now]
             if self._remembers:
                 store = self._remember(store, records, plan, works_now, before)

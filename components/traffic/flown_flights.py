@@ -243,7 +243,7 @@ class FlownFlights:
         others = {viewer: self.nominal(-1)}
         return self.nominal(viewer), WithOthers(self.targets, self.width, others)
 
-    def as_flown(self) -> Fleet:
+    def flown_target_flights(self) -> Fleet:
         """Return the flights of the targets with all manoeuvres."""
         steered = {index: self.of_platform(index) for index in self.steered_targets}
         return WithOthers(self.targets, self.width, steered) if steered else self.targets

@@ -332,7 +332,7 @@ class TrafficSource(Component):
         self._flown = replace(flown, fleet=fleet)
         assert isinstance(self.own, SteeredFlight)
         self.own = SteeredFlight(self.own.flight, fleet)
-        self.targets = self._flown.as_flown()
+        self.targets = self._flown.flown_target_flights()
         return known
 
     def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
@@ -354,7 +354,7 @@ class TrafficSource(Component):
         return self._flown.platform_at(-1, np.zeros(len(time_s), dtype=np.int64), time_s)
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: the truth where a scene is small, or asks for it."""
+        """Return the recorded message types: the truth where a scene is small, or has that set."""
         return [TrafficStates, TrueStates] if self.says_truth else [TrafficStates]
 
     def sample_times(self) -> list[SampleTimes]:

@@ -30,8 +30,8 @@ from components.sensor.parameters import (
     CorrelationTime,
     ErrorParameters,
     SensorParameters,
+    check_elevations,
     clockwise_azimuths,
-    rising_elevations,
 )
 from components.sensor.sensor import Sensor
 from components.visual.acquisition import (
@@ -68,7 +68,7 @@ class LookoutParameters(SensorParameters):
         description="Field of view from the left seat, clockwise from the first to the second, "
         "deg; that from the right seat is its mirror image.",
     )
-    elevation_deg: Annotated[tuple[float, float], AfterValidator(rising_elevations)] = Field(
+    elevation_deg: Annotated[tuple[float, float], AfterValidator(check_elevations)] = Field(
         default=(-20.0, 35.0), description="Field of view in elevation, lowest and highest, deg."
     )
     left_looking: float = Field(

@@ -256,7 +256,7 @@ class Wiring:
     # -- what the FMU's process needs to know --------------------------------------------------
 
     def spec(self, name: str, ticks_per_s: int, *, rewinds: bool) -> dict[str, Any]:
-        """Return what the FMU's process needs to know.
+        """Return the specification of the wiring for the FMU's process.
 
         Raises
         ------
