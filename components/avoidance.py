@@ -15,7 +15,7 @@ from components.guidance.daidalus import (
     smaller,
 )
 from components.messages.alerts import AlertLevels
-from components.messages.detections import without_range
+from components.messages.detections import describe_rangeless
 from components.messages.steering import (
     SLOWEST_TURN_DEG_S,
     ChosenSides,
@@ -28,7 +28,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 
 _KINDS = {"turn": "hdir", "climb": "alt", "speed": "hs", "vertical_speed": "vs"}
 # Where the configuration has manoeuvres take no time, they are flown so fast: 3 deg/s, 500 ft/min,
@@ -67,13 +67,15 @@ class TurnOutParameters(ConfParameters):
         default=Fraction(10), description="What another one has told counts for so long, s."
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of a manoeuvre that is not chosen."""
         used = {"turn": "beyond_deg", "climb": "beyond_m"}.get(self.manoeuvre, "beyond_mps")
         keys = {"beyond_deg", "beyond_m", "beyond_mps"} - {used}
         because = f"manoeuvre is '{self.manoeuvre}'"
-        said = super().without_effect() + self.idle(*sorted(keys), because=because)
-        alone = self.idle("heeds_s", because="address is not given")
+        said = super().ineffective_key_notes() + self.note_ineffective(
+            *sorted(keys), because=because
+        )
+        alone = self.note_ineffective("heeds_s", because="address is not given")
         return said if self.address is not None else said + alone
 
 
@@ -134,14 +136,14 @@ class TurnOut(Component):
                 )
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: sides only where it tells them."""
+        """Return the recorded message types: chosen sides only where they are sent."""
         return [Manoeuvres] if self.p.address is None else [*super().records()]
 
     def offer(self, port: str) -> int | None:
         """Return the address of this aircraft, for coordination with the others."""
         return self.p.address
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how often it was to steer, and no change led clear."""
         return {"no change leads clear and the ownship is left alone": self._stuck}
 
@@ -182,7 +184,7 @@ class TurnOut(Component):
                 change = None if changes is None else self._choose(run, tick, changes)
                 if changes is not None and self._is_free(run, tick):
                     due = np.array([run])
-                    self._stuck = with_cases(self._stuck, due[: change is None], due)
+                    self._stuck = count_cases(self._stuck, due[: change is None], due)
                 if change is not None:
                     manoeuvres[index] = self._manoeuvre(change)
                     self._free_from[run] = tick + self._pause_ticks
@@ -206,7 +208,7 @@ class TurnOut(Component):
                 known = [old for old in self._heard.get(run, ()) if old[0] > since]
                 self._heard[run] = (*known, (one[0], one[1], one[2]))
 
-    def _other_choices(self, run: int, tick: int) -> list[tuple[int, int]]:
+    def _find_valid_choices(self, run: int, tick: int) -> list[tuple[int, int]]:
         """Return address and side of every other aircraft whose choice is valid at an instant.
 
         The lowest address first; windows may know more than has come by then.
@@ -234,7 +236,9 @@ class TurnOut(Component):
     def _must_give_way(self, run: int, tick: int) -> bool:
         """Return whether an aircraft of lower address has chosen a manoeuvre that conflicts."""
         mine = self._repeated_side(run, tick) if self.p.address is not None else 0
-        first = [side for a, side in self._other_choices(run, tick) if a < (self.p.address or 0)]
+        first = [
+            side for a, side in self._find_valid_choices(run, tick) if a < (self.p.address or 0)
+        ]
         return bool(mine and first and self._matching_side(first[0]) != mine)
 
     def _choose(self, run: int, tick: int, changes: tuple[float, float]) -> float | None:
@@ -243,7 +247,7 @@ class TurnOut(Component):
 
         Without a way there it is free, but not before its time.
         """
-        others = self._other_choices(run, tick) if self.p.address is not None else []
+        others = self._find_valid_choices(run, tick) if self.p.address is not None else []
         if others:
             (address, side), mine = others[0], self._repeated_side(run, tick)
             # Only a lower address changes what was chosen in this conflict.
@@ -254,7 +258,7 @@ class TurnOut(Component):
         return smaller(changes) if self._is_free(run, tick) else None
 
     def _manoeuvre(self, change: float) -> Manoeuvre:
-        """Return what makes a change."""
+        """Return the manoeuvre that makes a change."""
         conf = self._configuration
         if self.p.manoeuvre == "climb":
             beyond_m = math.copysign(self.p.beyond_m, change)
@@ -311,12 +315,12 @@ class TurnAwayParameters(Parameters):
         default=Fraction(60), description="Shortest time from one manoeuvre to the next, s."
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence if a turn rate is given beside a bank, which determines it."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.bank_deg is None:
             return said
-        return said + self.idle("rate_deg_s", because="bank_deg is given")
+        return said + self.note_ineffective("rate_deg_s", because="bank_deg is given")
 
 
 class TurnAway(Component):
@@ -349,12 +353,12 @@ class TurnAway(Component):
 
     def warnings(self) -> list[str]:
         """Warn that no sensor measures the range that it needs."""
-        blind = "" if self.p.without_range else without_range(self.context.producers)
+        blind = "" if self.p.without_range else describe_rangeless(self.context.producers)
         if not blind:
             return []
         return [f"without_range is false and {blind} measures no range: it never turns"]
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how many tracks had no range and were not acted on."""
         return (
             {}
@@ -371,7 +375,7 @@ class TurnAway(Component):
         row = tracks.row_of_entries
         rangeless = np.isnan(tracks.range_m)
         of = take_runs(tracks.run, row)
-        self._rangeless = with_cases(self._rangeless, take_runs(of, rangeless.nonzero()[0]), of)
+        self._rangeless = count_cases(self._rangeless, take_runs(of, rangeless.nonzero()[0]), of)
         if self.p.without_range:
             near |= rangeless
         manoeuvres: dict[int, Manoeuvre] = {}

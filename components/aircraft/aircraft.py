@@ -261,7 +261,7 @@ class Roster:
         every = [*self.aircraft, *(one for _, then in self.later for one in then.aircraft)]
         return Equipage.from_aircraft(every, np.tile(self.keys, len(every) // max(1, len(self))))
 
-    def equipped(self, craft: IntArray, instant_ns: IntArray) -> IntArray:
+    def equipage_rows(self, craft: IntArray, instant_ns: IntArray) -> IntArray:
         """Return the rows of `equipage` for some of the aircraft at instants of the run."""
         if not self.later:
             return craft
@@ -347,10 +347,10 @@ def joint_roster(
     if len(aircraft) % width:
         return None
     alike = [
-        _fit(one, (first.names[number % width], first.aircraft[number % width]))
+        _is_same_aircraft(one, (first.names[number % width], first.aircraft[number % width]))
         for number, one in enumerate(aircraft)
     ]
-    alike += [_fit(one, (first.own_name, first.own_aircraft[0])) for one in own]
+    alike += [_is_same_aircraft(one, (first.own_name, first.own_aircraft[0])) for one in own]
     if None in alike:
         return None
     if all(alike):
@@ -359,7 +359,7 @@ def joint_roster(
     return Roster(first.names, tuple(craft for _, craft in aircraft), first.own_name, mine)
 
 
-def _fit(one: tuple[str, Aircraft], other: tuple[str, Aircraft]) -> bool | None:
+def _is_same_aircraft(one: tuple[str, Aircraft], other: tuple[str, Aircraft]) -> bool | None:
     """Return whether an aircraft is the same as another's, None where no roster holds both."""
     if one[0] != other[0]:
         return None

@@ -208,7 +208,7 @@ class Equipage:
         )
 
 
-def with_shares(
+def draw_equipage(
     names: Sequence[str], aircraft: Sequence[Any], shares: EquipageShares, stream: Any
 ) -> list[Any]:
     """Return aircraft of which only the shares keep their equipage, drawn by their names."""

@@ -28,7 +28,7 @@ class KnownTraffic:
         self._views: dict[int, KnownTraffic] = {}
 
     def seen_from(self, platform: str) -> "KnownTraffic":
-        """Return what is offered to who looks from a platform."""
+        """Return the offer of targets as a viewer on one platform sees them."""
         if platform == self.roster.own_name:
             return self
         target = self.roster.names.index(platform)

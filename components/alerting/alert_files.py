@@ -10,7 +10,7 @@ import numpy as np
 from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration
 from components.alerting.alert_figure import draw_alerts
-from components.alerting.alert_tables import alert_table, bands_table, without_memory
+from components.alerting.alert_tables import alert_table, bands_table, remove_hysteresis
 from components.alerting.encounter import Encounter, read_encounter
 from components.alerting.levels import Alerts, alert_levels
 from components.formats.recorded.traffic_of_files import TrafficChoice
@@ -64,7 +64,7 @@ def alert_files(
             check_file(path, option)
     configuration = _read_configuration(Path(conf))
     if no_hysteresis:
-        configuration = without_memory(configuration)
+        configuration = remove_hysteresis(configuration)
     own = None if own_file is None else Path(own_file)
     choice = TrafficChoice(ownship=ownship, own_file=own)
     done = _alerts(configuration, paths, _wind_mps(wind), choice)

@@ -38,7 +38,7 @@ _SEPARATION = (
 )
 
 
-def without_memory(configuration: Configuration) -> Configuration:
+def remove_hysteresis(configuration: Configuration) -> Configuration:
     """Return a configuration without hysteresis, so that every row is judged independently."""
     values = dict(configuration.values)
     values.update(hysteresis_time=0.0, persistence_time=0.0, alerting_m=0, alerting_n=0)

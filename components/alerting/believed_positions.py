@@ -14,7 +14,7 @@ from components.messages.tracks import Tracks
 from dsa_des.arrays.run_ticks import RunTicks, first_of_run, last_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import NO_RUNS, with_cases
+from dsa_des.record.failure_counts import NO_RUNS, count_cases
 
 # Positions closer in time than this are one instant, from which no velocity follows, s.
 _SHORTEST_S = 1e-6
@@ -50,7 +50,7 @@ class BelievedPositions:
         #: velocity.
         self._rangeless, self._unmoving = np.zeros((2, 2, 0), dtype=np.int64)
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how often something could not be judged, by run."""
         return count_not_judged(self._rangeless, self._unmoving)
 
@@ -68,7 +68,7 @@ class BelievedPositions:
             new &= sights.updated  # others came with an earlier row
         with_range = np.isfinite(sights.range_m)
         run = arrived.instants.run[row]
-        self._rangeless = with_cases(self._rangeless, run[new & ~with_range], run[new])
+        self._rangeless = count_cases(self._rangeless, run[new & ~with_range], run[new])
         new &= with_range
         # The attitude of when it was measured, of those that have arrived.
         came = arrived.instants.take(row)
@@ -82,7 +82,7 @@ class BelievedPositions:
         body = level * np.cos(azimuth), level * np.sin(azimuth), -range_m * np.sin(elevation)
         north, east, down = body_to_ned(*body, yaw, pitch, roll)
         # A row of its own for every instant of measurement.
-        line, of, made = _by_instant(sights.tick, row, sights.measured_tick[new])
+        line, of, made = _group_by_instant(sights.tick, row, sights.measured_tick[new])
         position = np.full((len(made), self._targets, 3), np.nan)
         position[line, sights.target[new]] = np.stack([east, north, -down], axis=-1)
         self.add_truth(arrived.instants.take(of), made / wake.ticks_per_s, position)
@@ -137,7 +137,7 @@ class BelievedPositions:
             )
         if not known.all() and len(time_s):
             self._add_slow(now, now_s, known, state)
-        self._unmoving = with_cases(self._unmoving, NO_RUNS, now.run[known.nonzero()[0]])
+        self._unmoving = count_cases(self._unmoving, NO_RUNS, now.run[known.nonzero()[0]])
         return known, state
 
     def _add_slow(
@@ -158,7 +158,7 @@ class BelievedPositions:
         state[:, scans[of], target] = found[1][:, :, 0]
         there = (last >= 0) & (now_s[scans, np.newaxis] - time_s[last] <= self._keep_s)
         lacking = now.run[scans[(there & ~known[scans]).nonzero()[0]]]
-        self._unmoving = with_cases(self._unmoving, lacking, lacking)
+        self._unmoving = count_cases(self._unmoving, lacking, lacking)
 
     def _last_two(self, now: RunTicks) -> tuple[IntArray, IntArray]:
         """Return the last rows with a position of each target, of two instants, by some instants.
@@ -207,7 +207,7 @@ def true_positions_m(states: TrafficStates) -> FloatArray:
     return position
 
 
-def _by_instant(
+def _group_by_instant(
     tick: IntArray, row: IntArray, measured: IntArray
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Return the line of each entry, and the row and the instant of measurement of each line.

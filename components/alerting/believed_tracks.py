@@ -23,7 +23,7 @@ from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.run_ticks import RunTicks, last_of_run
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import with_cases
+from dsa_des.record.failure_counts import count_cases
 
 # Upper triangle of a covariance in its columns.
 _PAIRS = tuple(COVARIANCE)
@@ -64,7 +64,7 @@ class EstimatedFlights:
         """Store the tracks of a tracker, and when each row came."""
         good = np.isin(tracks.track_status, (CONFIRMED, COASTED))
         run = came.run[row_of_entries(tracks.offsets)]
-        self.rangeless = with_cases(self.rangeless, run[good & ~tracks.has_range], run[good])
+        self.rangeless = count_cases(self.rangeless, run[good & ~tracks.has_range], run[good])
         good &= tracks.has_range
         before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
         begin = len(self._tracks) + before[:-1]
@@ -195,7 +195,7 @@ class BelievedTracks:
         #: At how many scans the ownship's velocity is not known yet, of how many, by run.
         self._unmoving = np.zeros((2, 0), dtype=np.int64)
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how often something could not be judged, by run."""
         return count_not_judged(self._estimates.rangeless, self._unmoving)
 
@@ -221,7 +221,7 @@ class BelievedTracks:
         # Without two poses the ownship's own velocity is not known, and no relative one.
         known = np.isfinite(own["east_mps"])
         moving = known.nonzero()[0]
-        self._unmoving = with_cases(self._unmoving, asked.run[~known], asked.run)
+        self._unmoving = count_cases(self._unmoving, asked.run[~known], asked.run)
         now = asked.take(moving)
         east, north, climb = (own[name][moving] for name in _OWN_VELOCITY)
         velocity_m_s = np.stack([north, east, -climb])
@@ -246,11 +246,11 @@ class BelievedTracks:
 
     def forget(self, asked: RunTicks, times_s: FloatArray, wake: Wake) -> None:
         """Drop what later ones have replaced at some scans."""
-        self._estimates.keep(_asked_later(self._estimates.arrival_ticks, asked, wake))
-        self._true = self._true.take(_asked_later(self._true.instants, asked, wake))
+        self._estimates.keep(_is_needed_later(self._estimates.arrival_ticks, asked, wake))
+        self._true = self._true.take(_is_needed_later(self._true.instants, asked, wake))
 
 
-def _asked_later(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
+def _is_needed_later(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
     """Return which rows later scans may still need: the last one before each of them, and later
     ones.
     """

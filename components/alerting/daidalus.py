@@ -8,7 +8,7 @@ from pydantic import Field, field_validator
 
 from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration, Deviations, margins
-from components.alerting.alert_tables import without_memory
+from components.alerting.alert_tables import remove_hysteresis
 from components.alerting.believed_positions import (
     BelievedFlights,
     BelievedPositions,
@@ -22,7 +22,7 @@ from components.alerting.received import OwnPoses
 from components.guidance.daidalus import ConfParameters
 from components.guidance.situation import State
 from components.messages.alerts import MOST_LEVELS, AlertLevels, AlertsOffered
-from components.messages.detections import without_range
+from components.messages.detections import describe_rangeless
 from components.messages.fused import WITHOUT_POSE, FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
@@ -110,7 +110,7 @@ class DaidalusAlerting(Component):
         """Read the configuration and find out what is believed."""
         configuration, self._alerter = self.p.read()
         if not self.p.hysteresis:
-            configuration = without_memory(configuration)
+            configuration = remove_hysteresis(configuration)
         ports = {producer.port for producer in self.context.producers}
         wired = [port for port in _SOURCES if port in ports]
         if len(wired) > 1:
@@ -146,13 +146,13 @@ class DaidalusAlerting(Component):
                 f"{float(self.context.duration_s):g} s it scans once, which tells no velocity"
             )
         heard = [one for one in self.context.producers if one.port == self._source]
-        if blind := without_range(heard):
+        if blind := describe_rangeless(heard):
             said.append(f"{blind} measures no range: nothing of what it hears of is judged")
         return said
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how often a flight could not be judged, by run."""
-        return {} if self._roster is None else self._belief.undone()
+        return {} if self._roster is None else self._belief.failure_counts()
 
     def run(self, wake: Wake) -> AlertLevels | None:
         """Store the messages of this wake-up, and return the alert levels of each scan due."""
@@ -245,7 +245,7 @@ class DaidalusAlerting(Component):
 
 
 def _track_columns(flights: BelievedFlights) -> dict[str, AnyArray]:
-    """Return what is recorded of the tracks that are believed; nothing where there are none."""
+    """Return the recorded columns of the believed tracks; none without tracks."""
     if flights.number is None or flights.age_s is None:
         return {}
     return {"track": flights.number, "track_age_s": flights.age_s}

@@ -45,7 +45,7 @@ def levels_due_by_spread(
                     (due, level.alerting_time_s),
                     (early, level.early_alerting_time_s),
                 ):
-                    unsafe = conflicts.unsafe(0.0, horizon_s)
+                    unsafe = conflicts.is_unsafe(0.0, horizon_s)
                     met = (near & (unsafe[:, :-1] | unsafe[:, 1:])).any(axis=1)
                     level_due[part, number] |= met
     return due, early

@@ -29,7 +29,7 @@ class OthersTracks:
 
     @classmethod
     def of(cls, context: Context, probability: float, intensity_m2_s3: float) -> Self:
-        """Return it of a block's neighbours, which say what carries each sensor."""
+        """Return an instance for a block, from its producers' declared sensors and platforms."""
         others = frozenset(
             name
             for name, offer in sensor_offers(context.producers).items()

@@ -27,7 +27,7 @@ class ReceivedRows(KeyedTable):
         return RunTicks(self.replica, self.came)
 
     def append(self, came: RunTicks, **columns: Any) -> Self:
-        """Return them with rows that came later, or in other runs."""
+        """Return the rows with others appended that came later, or in other runs."""
         new = type(self)(replica=came.run, came=came.tick, **columns)
         every = self.concatenate([self, new])
         order = every.instants.order()

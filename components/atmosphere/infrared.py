@@ -235,7 +235,7 @@ def haze_share_at(visibility_m: ArrayLike, wavelength_um: float) -> Any:
 def band_extinction_per_m(
     band: str, haze_visibility_m: float | None = None, rain_extinction_per_m: float = 0.0
 ) -> float:
-    """Return what haze, fog and rain take from a band ("mwir" or "lwir"), per metre.
+    """Return the extinction by haze, fog and rain in a band ("mwir" or "lwir"), 1/m.
 
     `haze_visibility_m` is that in the haze or fog alone; large drops of rain take the same from all
     light.

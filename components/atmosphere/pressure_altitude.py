@@ -54,15 +54,15 @@ class Air:
     def pressure_altitude_m(self, height_m: ArrayLike) -> Any:
         """Return what altimeters read at heights from -5 to 30 km, m."""
         height = check_within("height_m", height_m, LOWEST_M, HIGHEST_M, "m") - self.geoid_m
-        return _STANDARD.height_m(self._column.drop(height) - self._excess)
+        return _STANDARD.height_m(self._column.drop(height) - self._qnh_log_ratio)
 
     def height_m(self, altitude_m: ArrayLike) -> Any:
         """Return the heights at which altimeters read some altitudes, m; its inverse."""
         altitude = check_within("altitude_m", altitude_m, LOWEST_M, HIGHEST_M, "m")
-        return self._column.height_m(_STANDARD.drop(altitude) + self._excess) + self.geoid_m
+        return self._column.height_m(_STANDARD.drop(altitude) + self._qnh_log_ratio) + self.geoid_m
 
     @property
-    def _excess(self) -> float:
+    def _qnh_log_ratio(self) -> float:
         return float(np.log(self.qnh_hpa / STANDARD_HPA))
 
     @cached_property
@@ -99,7 +99,7 @@ class _AirColumn:
         lapse = -np.diff(kelvin) / np.diff(heights_m)
         self._lapse_k_m = np.concatenate([[_LAPSE_K_M], lapse, [0.0]])
         layer = np.arange(1, len(heights_m))
-        drops = np.concatenate([[0.0], np.cumsum(self._rise(layer, np.diff(heights_m)))])
+        drops = np.concatenate([[0.0], np.cumsum(self._pressure_drop(layer, np.diff(heights_m)))])
         self._from_drop = drops - drops[np.searchsorted(heights_m, 0.0)]
         self._base_drop = self._from_drop[below]
 
@@ -107,10 +107,10 @@ class _AirColumn:
         """Return by how much the logarithm of pressure falls from sea level to heights."""
         layer = np.searchsorted(self._from_m, height_m, side="right")
         above_m = height_m - self._base_m[layer]
-        return np.asarray(self._base_drop[layer] + self._rise(layer, above_m))
+        return np.asarray(self._base_drop[layer] + self._pressure_drop(layer, above_m))
 
-    def _rise(self, layer: IntArray, height_m: FloatArray) -> FloatArray:
-        """Return by how much it falls from the bases of layers to heights above these."""
+    def _pressure_drop(self, layer: IntArray, height_m: FloatArray) -> FloatArray:
+        """Return the drop of log pressure from the bases of layers to heights above them."""
         lapse, kelvin = self._lapse_k_m[layer], self._base_k[layer]
         even = np.where(lapse == 0.0, 1.0, lapse)
         falling = -_HYDROSTATIC_K_M / even * np.log1p(-lapse * height_m / kelvin)

@@ -34,7 +34,7 @@ class Pair:
     forms: Callable[[str, bool], tuple[Scene, Scene]]
 
 
-def without_unused_effects(scene: Scene) -> Scene:
+def drop_unused_effects(scene: Scene) -> Scene:
     """Return a scene whose blocks declare no effects but those that it calls for."""
     used: dict[str, set[str]] = {}
     for item in Simulation(scene).plan:
@@ -51,7 +51,7 @@ def without_unused_effects(scene: Scene) -> Scene:
 
 def _effects(case: str, quick: bool) -> tuple[Scene, Scene]:
     scene = scene_of(select_cases([case])[0], quick=quick)
-    return scene, without_unused_effects(scene)
+    return scene, drop_unused_effects(scene)
 
 
 def _processor(case: str, quick: bool) -> tuple[Scene, Scene]:

@@ -82,7 +82,7 @@ def _runs_of(scene: Scene, wanted: dict[str, Any]) -> Callable[[int], Callable[[
 
 
 def flights(count: int) -> Callable[[], object]:
-    """Return what runs open-loop encounters with other flights each."""
+    """Return a function that runs open-loop encounters, each with other flights."""
     sets = ("blocks.radar.scan_rate_hz=1", "blocks.eo.scan_rate_hz=1", "blocks.ir.scan_rate_hz=1",
             "blocks.eo.offset_s=0.05", "blocks.ir.offset_s=0.1", _TWO)  # fmt: skip
     scene = load_scene(SCENES / "monte_carlo.toml", sets=sets, duration_s=_DURATION_S)
@@ -91,14 +91,14 @@ def flights(count: int) -> Callable[[], object]:
 
 
 def loop(count: int) -> Callable[[], object]:
-    """Return what runs the same in a closed loop, with alerts and a pilot."""
+    """Return a function that runs such encounters in a closed loop, with alerts and a pilot."""
     path = folder() / "avoidance" / "crossing_pilot.toml"
     scene = load_scene(path, sets=(_TWO,), duration_s=_DURATION_S)
     return _runs_of(scene, {"alerts": ("tick", "level"), "manoeuvres": ("tick",)})(count)
 
 
 def replicas(count: int) -> Callable[[], object]:
-    """Return what runs a chunk of a study: one encounter with other phases of the clocks.
+    """Return a function that runs a chunk of a study: one encounter, other clock phases.
 
     Its metrics are those of first detections and of the age of information, with what they need of
     the tables `scans`, `detections` and `fused` recorded to memory.
@@ -113,7 +113,7 @@ def replicas(count: int) -> Callable[[], object]:
 
 
 def replicas_all(count: int) -> Callable[[], object]:
-    """Return what runs the same replicas with every column, and the truth, recorded to memory."""
+    """Return a function that runs the replicas with all columns and the truth recorded."""
     (case,) = select_cases(["monte_carlo"])
     scenes = replicas_of(scene_of(case, quick=False, sets=("record.truth=true",)), count)
 
@@ -126,7 +126,7 @@ def replicas_all(count: int) -> Callable[[], object]:
 
 
 def risk(count: int) -> Callable[[], object]:
-    """Return what runs a chunk of a study of a risk ratio, nominal and mitigated."""
+    """Return a function that runs a chunk of a risk-ratio study, nominal and mitigated."""
     tables = {
         "replicas": 100_000,
         "metrics": ["risk_ratio"],
@@ -136,7 +136,7 @@ def risk(count: int) -> Callable[[], object]:
 
 
 def risk_tracked(count: int) -> Callable[[], object]:
-    """Return what runs a chunk of the shipped study `radar_and_camera_risk`."""
+    """Return a function that runs a chunk of the shipped study `radar_and_camera_risk`."""
     volume = {"horizontal_m": 670.56, "vertical_m": 137.16, "by": [], "needless": True}
     tables = {
         "replicas": 100_000,
@@ -147,7 +147,7 @@ def risk_tracked(count: int) -> Callable[[], object]:
 
 
 def _chunks(scene: str, tables: dict[str, Any], count: int) -> Callable[[], object]:
-    """Return what runs chunks of a study, each time one of other runs."""
+    """Return a function that runs another chunk of a study at each call."""
     study = study_of_tables(tables, read_scene_file(SCENES / scene), (), ())
     starts = iter(range(0, 100_000 - count, count))  # each time other encounters
 

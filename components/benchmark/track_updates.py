@@ -49,7 +49,7 @@ class Listening(ExtendedKalman):
         return super().run(wake)
 
 
-def listening(replicas: int, targets: int) -> Listening:
+def make_listening(replicas: int, targets: int) -> Listening:
     """Return the tracker of a run of some replicas, with all that it was given.
 
     Three sensors see every target at every look.
@@ -63,8 +63,8 @@ def listening(replicas: int, targets: int) -> Listening:
 
 
 def updates(replicas: int, targets: int) -> Callable[[], object]:
-    """Return what tracks all targets of some replicas anew, gating and association included."""
-    known = listening(replicas, targets)
+    """Return a function that tracks all targets of some replicas anew, with gating."""
+    known = make_listening(replicas, targets)
 
     def track() -> None:
         block = ExtendedKalman(known.name, known.p, known.context)
@@ -136,7 +136,7 @@ class PlainLook:
 
 
 def measure_state(state: FloatArray, look: PlainLook, size: int) -> tuple[FloatArray, FloatArray]:
-    """Return what a look would measure of a state, (size,), and the derivative, (size, 6)."""
+    """Return the expected measurement of a state, (size,), and its derivative, (size, 6)."""
     away = state[:3] - look.position_m
     x, y, z = look.to_body @ away
     level, distance = hypot(x, y), sqrt(x * x + y * y + z * z)
@@ -208,7 +208,7 @@ _FEW = 27
 
 def plain_updates(targets: int) -> tuple[int, Callable[[], object]]:
     """Return how many updates the plain loop does in one run, and what does them."""
-    block = listening(1, targets)
+    block = make_listening(1, targets)
     scans, poses = _looks(block)
     looks = plain_looks(scans, poses, block.context.ticks_per_s)
     first, rest = _start_tracks(scans, poses, block.p.start_speed_m_s), looks[1:]
@@ -226,7 +226,7 @@ def stone_soup_updates(targets: int) -> tuple[int, Callable[[], object]] | None:
         return None
     from components.stone_soup.objects import Poses, detections, instant
 
-    block = listening(1, targets)
+    block = make_listening(1, targets)
     scans, believed = _looks(block)
     poses = Poses(believed)
     looks = []

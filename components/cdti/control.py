@@ -173,7 +173,7 @@ class SessionControl:
             self._server.announce_picture()
 
     def sentence(self) -> str:
-        """Return what was decided, for the terminal."""
+        """Return a sentence on a decision, for the terminal."""
         taken = sum(answer["type"] == "taken" for answer in self._answers.values())
         return f"{taken} decision{'' if taken == 1 else 's'} taken in, up to {self._now[0]:.1f} s"
 

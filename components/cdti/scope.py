@@ -224,7 +224,7 @@ class Scope:
         return round(own.alt_m + value, 1)
 
     def picture(self, time_s: float, received: Received | None = None) -> dict[str, Any]:
-        """Return what is shown at an instant of what was received, for JSON: m, deg, s."""
+        """Return the picture of the display at an instant, for JSON: m, deg, s."""
         own, contacts, alerts, since, reported, bands, heard = (
             self.take_received() if received is None else received
         )

@@ -169,7 +169,7 @@ class DisplayServer:
         self.loop.set_exception_handler(limit.on_error)
         try:
             server = await serve(
-                self._meet,
+                self._serve_page,
                 self._host,
                 self._port,
                 process_request=self._answer,
@@ -177,7 +177,7 @@ class DisplayServer:
                 compression=None,
                 server_header=None,
                 logger=quiet,
-                create_connection=cast(type[ServerConnection], limit.connection),
+                create_connection=cast(type[ServerConnection], limit.make_connection),
                 ping_interval=10,
                 ping_timeout=20,
                 close_timeout=1,
@@ -215,7 +215,7 @@ class DisplayServer:
             return connection.respond(503, "too many browsers\n")
         return None
 
-    async def _meet(self, connection: ServerConnection) -> None:
+    async def _serve_page(self, connection: ServerConnection) -> None:
         """Live with one page until it goes."""
         assert connection.request is not None
         query = parse_qs(urlsplit(connection.request.path).query)
@@ -294,8 +294,8 @@ class ConnectionLimit:
         self._open = 0
         self._said = self._starved = False
 
-    def connection(self, *given: Any, **options: Any) -> ServerConnection:
-        """Return what `websockets.asyncio.server.serve` makes of a new connection."""
+    def make_connection(self, *given: Any, **options: Any) -> ServerConnection:
+        """Return a connection object for `websockets.asyncio.server.serve` that is limited."""
         return _Limited(self, *given, **options)
 
     def count_opened(self) -> bool:

@@ -50,7 +50,7 @@ class Alerted:
         return sorted({level for mine in self.stretches.values() for level, _, _ in mine})
 
     def key(self) -> list[Any]:
-        """Return what a legend says of them."""
+        """Return the legend's entries for the alert levels."""
         from matplotlib.lines import Line2D
 
         handles = []

@@ -45,7 +45,7 @@ def outline_of(
     if not closed:
         angle = angle[:0] if everywhere else angle[[0, -1]]
     radius_km = reach.range_max_m / 1000 if closed else 1.0
-    azimuth, elevation = axes.pointing(angle, np.zeros(len(angle)))
+    azimuth, elevation = axes.true_direction(angle, np.zeros(len(angle)))
     bearing = yaw_rad + azimuth
     level_km = radius_km * np.cos(elevation) if closed else np.ones(len(angle))
     corners = np.column_stack((np.sin(bearing), np.cos(bearing))) * level_km[:, np.newaxis]
@@ -87,7 +87,7 @@ def reach_text(reach: Any, axes: Any) -> str:
     low, high = (math.degrees(angle) for angle in reach.azimuth_rad)
     field = f"±{high:.4g}°" if low == -high else f"{low:.4g}° to {high:.4g}°"
     azimuth, elevation = (
-        round(math.degrees(angle[0]), 6) for angle in axes.pointing(*np.zeros((2, 1)))
+        round(math.degrees(angle[0]), 6) for angle in axes.true_direction(*np.zeros((2, 1)))
     )
     if azimuth or elevation:
         field += f"\nround {azimuth:.4g}°"

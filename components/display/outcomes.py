@@ -162,7 +162,7 @@ _BY_BLOCK = ("sensors", "tracks", "late_looks", "alerts", "manoeuvres")
 
 
 def carried_blocks(simulation: Simulation) -> dict[str, str]:
-    """Return what carries each block, the ownship's blocks first; nothing where one carries all."""
+    """Return the platform of each block, the ownship's first; empty where there is only one."""
     first = {name for one in simulation.components.values() for name in one.platforms()[:1]}
     carried = simulation.platforms.items()
     return dict(sorted(carried, key=lambda item: (item[1] not in first, item[1], item[0])))

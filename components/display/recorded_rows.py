@@ -212,7 +212,7 @@ class ScansShown:
 
 
 def read_scans(folder: Path) -> dict[str, SensorScans]:
-    """Return what the table ``scans`` of a run folder says of each sensor, by name."""
+    """Return count, times and first detection of scans by sensor, from a folder's ``scans``."""
     result: dict[str, SensorScans] = {}
     for rows in iterate_row_groups(folder / "scans.parquet", _SCANS):
         for name, (time_s, hit_s) in _times_by_sensor(rows).items():

@@ -99,12 +99,12 @@ class RecordedTables:
         return replace(self, tables=tables, _kept={})
 
     @cached_property
-    def _with_pose(self) -> Any:
+    def _join_pose(self) -> Any:
         return with_columns_of_rows(self.tables, "detections")
 
     def table(self, name: str) -> Any:
         """Return a table; detections have with them where the ownship was at each."""
-        return self._with_pose if name == "detections" else self.tables[name]
+        return self._join_pose if name == "detections" else self.tables[name]
 
     def flights(self) -> dict[str, dict[str, FloatArray]]:
         """Return the true flight of each aircraft by its name, the ownship first.
@@ -122,7 +122,7 @@ class RecordedTables:
             raise UsageError(f"{self.folder}: a target is called {own!r}: rename it")
         result: dict[str, dict[str, FloatArray]] = {}
         columns = {name: self.numbers("truth", name) for name in _STATE}
-        self.refuse_large("truth", columns)
+        self.refuse_large_values("truth", columns)
         aircraft = np.array([own if name is None else name for name in names], dtype=object)
         for name in [own, *sorted({n for n in names if n is not None})]:
             mine = np.flatnonzero(aircraft == name)
@@ -144,7 +144,7 @@ class RecordedTables:
             return None
         return np.stack([own[name.removeprefix("own_")][at] for name in POSE])
 
-    def refuse_large(self, table: str, columns: Mapping[str, FloatArray]) -> None:
+    def refuse_large_values(self, table: str, columns: Mapping[str, FloatArray]) -> None:
         """Raise `UsageError` for a value that is NaN or too large, naming column and row."""
         for name, values in columns.items():
             large = ~(np.abs(values) <= _LARGEST)

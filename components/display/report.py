@@ -56,10 +56,10 @@ class DetectAndSenseReport:
         show(console, summary)
 
     def compare(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-        """Return what changed from one run's recorded tables to another's."""
+        """Return the differences between two runs' recorded tables."""
         return compare_runs(reference, other)
 
-    def remarks(self, changes: Mapping[str, Any]) -> list[str]:
+    def describe_changes(self, changes: Mapping[str, Any]) -> list[str]:
         """Return which targets a sensor no longer sees at all."""
         missed = changes.get("never_detected")
         return [f"never sees {', '.join(missed)}"] if missed else []
@@ -105,7 +105,7 @@ def sensor_names(simulation: Simulation) -> list[str]:
 
 
 def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what changed from one run's tables to another's.
+    """Return the differences between two runs' tables.
 
     Tables are ``pyarrow.Table`` by name: ``detections`` and ``fused``. ``detections_gained`` and
     ``detections_lost`` count (sensor, target, instant) that only one of the runs has, of

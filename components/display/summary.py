@@ -115,11 +115,11 @@ class _Sensor:
         tick = columns["tick"]
         if self.first is None or self.first.tick == tick[rows[0]]:
             together = rows[: np.searchsorted(tick[rows], tick[rows[0]], side="right")]
-            self.first = _nearer(self.first, _Sighting.nearest(columns, together))
+            self.first = _select_nearer(self.first, _Sighting.nearest(columns, together))
         together = rows[np.searchsorted(tick[rows], tick[rows[-1]]) :]
         last = _Sighting.nearest(columns, together)
         same_instant = self.last is not None and self.last.tick == last.tick
-        self.last = _nearer(self.last, last) if same_instant else last
+        self.last = _select_nearer(self.last, last) if same_instant else last
 
     def result(self) -> dict[str, Any]:
         # Who looks at no target in particular, as a foreign sensor, cannot say whose they are.
@@ -137,11 +137,11 @@ class _Sensor:
                 for name, n in self.skipped.items()
                 if n or name != _HIDDEN
             },
-            "first_detection": self._with_end(self.first, 0),
-            "last_detection": self._with_end(self.last, 1),
+            "first_detection": self._mark_censored(self.first, 0),
+            "last_detection": self._mark_censored(self.last, 1),
         }
 
-    def _with_end(self, seen: "_Sighting | None", end: int) -> dict[str, Any] | None:
+    def _mark_censored(self, seen: "_Sighting | None", end: int) -> dict[str, Any] | None:
         """Return a sighting, and whether the sensor's first or last scan censors it."""
         if seen is None:
             return None
@@ -178,7 +178,7 @@ class _Sighting(NamedTuple):
         return {"time_s": self.time_s, "range_m": range_m, "target": self.target}
 
 
-def _nearer(one: _Sighting | None, other: _Sighting) -> _Sighting:
+def _select_nearer(one: _Sighting | None, other: _Sighting) -> _Sighting:
     if one is None or math.isnan(one.range_m):
         return other
     return other if other.range_m < one.range_m else one

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from components.display.outcomes import NEAR_M, select_platform
-from dsa_des.record.undone import undone_sentences
+from dsa_des.record.failure_counts import failure_sentences
 from dsa_des.text.safe_text import printable, shorten
 
 MOST_TARGETS = 10
@@ -22,7 +22,7 @@ def show(console: Any, summary: dict[str, Any]) -> None:
         console.print()
     if not summary.get("platforms"):
         _show_chain(console, summary, "the ownship")
-    for line in undone_sentences(summary.get("undone") or {}):
+    for line in failure_sentences(summary.get("undone") or {}):
         _print_line(console, line)
     for line in attitude_lines(summary.get("traffic") or {}):
         _print_line(console, line)

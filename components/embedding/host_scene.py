@@ -39,11 +39,11 @@ def load_for_host(
             raise UsageError("sets and swaps change a scene while it is loaded: give its file")
         loaded = scene if seed is None else replace(scene, seed=seed)
     else:
-        loaded = _loaded(scene, sets=sets, swaps=swaps, seed=seed)
-    return loaded if platform is None else _on_board(loaded, platform)
+        loaded = _load_scene(scene, sets=sets, swaps=swaps, seed=seed)
+    return loaded if platform is None else _select_platform(loaded, platform)
 
 
-def _loaded(
+def _load_scene(
     scene: Path | str, *, sets: Iterable[str], swaps: Iterable[str], seed: int | None
 ) -> Scene:
     scene_file = read_scene_file(find_input_file(scene, "scene"))
@@ -53,7 +53,7 @@ def _loaded(
     return load_tables(scene_file, sets=sets, swaps=swaps, seed=seed)
 
 
-def _on_board(scene: Scene, platform: str) -> Scene:
+def _select_platform(scene: Scene, platform: str) -> Scene:
     """Return a scene with the blocks on one platform alone, for which it is the ownship."""
     name = source_of(scene)
     block = scene.blocks[name]

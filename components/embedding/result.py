@@ -123,7 +123,7 @@ def _line(one: Sighting) -> str:
 def sightings_of(
     fused: FusedDetections | None, detections: Mapping[str, Detections]
 ) -> tuple[dict[int, Sighting], tuple[Sighting, ...]]:
-    """Return what was detected, by index in the roster, and the false alarms.
+    """Return the detections by index in the roster, and the false alarms.
 
     From one row of each message of a call; `fused` is None when no sensor reported.
     """

@@ -19,7 +19,7 @@ _HIGH = np.array([math.pi / 2, LARGEST, HIGHEST_ALTITUDE_M, LARGEST, LARGEST, LA
 
 
 def to_numbers(label: str, value: object) -> FloatArray:
-    """Return what a host gave as an array of numbers; ValueError names it where it is none."""
+    """Return a host's value as an array of numbers; ValueError names it where it is none."""
     mask = getattr(value, "mask", None)
     if mask is not None and np.any(mask):  # what a mask hides would be taken for a number
         raise ValueError(f"{label} has masked values: what is not there is NaN")

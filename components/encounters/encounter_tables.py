@@ -292,7 +292,7 @@ def _lines(risk: RiskRatio, confidence: float, skipped: int) -> list[str]:
 
 
 def _digits(risk: RiskRatio) -> Callable[[float], str]:
-    """Return what writes numbers with three digits, or down to the second of half the interval."""
+    """Return a function that formats numbers with three digits, or by their interval's width."""
     half = (risk.interval[1] - risk.interval[0]) / 2
     digits = 3
     if risk.ratio > 0 and half > 0:

@@ -226,12 +226,12 @@ class _EncounterTraffic(RecordedTraffic):
             raise ValueError("lat_deg and lon_deg belong together: give both, or neither")
         self.encounter_set, self.index = _encounter_of(type(self), self.p)
         own, *others = encounter_flights(self.encounter_set, self.index, self.p.dynamics)
-        notes = [f"encounter {self.encounter_set.numbers[self.index]}{self.of_how_many()}"]
+        notes = [f"encounter {self.encounter_set.numbers[self.index]}{self.set_size_text()}"]
         if self.encounter_set.skipped:
             notes.append(f"{self.encounter_set.skipped} damaged encounters of the set were skipped")
         return TrafficFile(own, others, 0.0, notes, notes[1:], height=self.said_height)
 
-    def of_how_many(self) -> str:
+    def set_size_text(self) -> str:
         """Return how many encounters there are to choose from, in words; nothing if any number."""
         return f" of {len(self.encounter_set)}"
 
@@ -289,7 +289,7 @@ class ModelTraffic(_EncounterTraffic):
         notes = [f"file {path}: {note}" for path in models for note in read_model(path).notes]
         return notes + super().warnings()
 
-    def of_how_many(self) -> str:
+    def set_size_text(self) -> str:
         """Return nothing: a model makes as many as are asked for."""
         return ""
 

@@ -174,7 +174,7 @@ class _Recipes:
         )
 
     def values(self, key: str, spec: _Quantity, factor: float) -> list[Any]:
-        """Return what a quantity is in turn: numbers, or ranges from which it is drawn."""
+        """Return the values of a quantity in turn: numbers, or ranges to draw them from."""
         given = self.tables[key]
         result: list[Any] = []
         for item in given if isinstance(given, list) else [given]:

@@ -75,7 +75,7 @@ def sample_tracks(
     each = _RAW_ROW if raw else _FLOWN_ROW
     if long := describe_long_work(asked, count * (seconds + 1), *each):
         say(f"note: {long}", err=True)
-    batches = _raw(encounter_model, seed, range(first, first + count), seconds)
+    batches = _sample_raw(encounter_model, seed, range(first, first + count), seconds)
     if not raw:
         batches = _fly_tracks(encounter_model, seed, range(first, first + count), seconds, dynamics)
     try:
@@ -102,7 +102,9 @@ def open_model(text: str) -> EncounterModel:
 _Columns = dict[str, AnyArray]
 
 
-def _raw(model: EncounterModel, seed: int, numbers: range, seconds: int) -> Iterator[_Columns]:
+def _sample_raw(
+    model: EncounterModel, seed: int, numbers: range, seconds: int
+) -> Iterator[_Columns]:
     """Yield columns as sampled by the network, before any rejection."""
     sampler = TrackSampler(model, EncounterDraws(seed, TRACKS))
     for tracks in sampler.batches(numbers, seconds):

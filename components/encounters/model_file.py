@@ -120,7 +120,7 @@ class _ModelReader:
         transition = self.network("transition", now, later, sorted(targets))
         rates = self.rates(labels)
         notes = self.totals(initial)
-        bins, taken = self.in_usual_units(labels, self.bins(labels, sizes))
+        bins, taken = self.convert_to_usual_units(labels, self.bins(labels, sizes))
         return EncounterModel(
             self.path, initial, transition, bins, rates, sources, targets, (*notes, *taken)
         )
@@ -271,7 +271,7 @@ class _ModelReader:
             bins.append(Bins(edges, size))
         return tuple(bins)
 
-    def in_usual_units(
+    def convert_to_usual_units(
         self, labels: tuple[str, ...], bins: tuple[Bins, ...]
     ) -> tuple[tuple[Bins, ...], list[str]]:
         """Return bins in ft/min and deg/s, and notes on those that must be in other units.

@@ -72,7 +72,7 @@ class Pairs:
         return Pairs(**{name: values.take(rows, axis=-1) for name, values in vars(self).items()})
 
     def at_start(self) -> "Pairs":
-        """Return them with their paths at time 0 only; commands stay as they are."""
+        """Return the pairs with their paths at time 0 only; commands stay."""
         paths = {name: getattr(self, name)[:, :1] for name in _PATHS}
         return replace(self, **paths)
 
@@ -205,7 +205,7 @@ class PairSampler:
         return rows[kept], kept, pairs
 
     def _flight(self, which: int, numbers: IntArray, attempts: IntArray) -> "_Flight":
-        """Return what tracks of one aircraft command, and which keep their own rules."""
+        """Return the commands of tracks of one aircraft, and which keep their own rules."""
         rules = self._rules[which]
         tracks = self._tracks[which].sample(numbers, self.rules.duration_s, attempts)
         commands = rules.commands(tracks)

@@ -196,19 +196,19 @@ class RiskRatios(Mitigated):
         return result
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return what no manoeuvre changes, and the geometry of the closest approach."""
+        """Return the results that no manoeuvre changes, and the closest approach's geometry."""
         meeting, sizes_m = meetings_in_plane(group, self.p), self.p.sizes_m
         if meeting is None:
-            result = self._of_nominal(group)
+            result = self._nominal_events(group)
             geometry = partial(nominal_geometry, widen_cylinders(sizes_m))
-            closest, *misses_m = np.split(self.of_flights(group, geometry, steered=False), [7, 9])
+            closest, *misses_m = np.split(self.read_flights(group, geometry, steered=False), [7, 9])
         else:
-            closest, result = meeting.closest, self._of_meeting(meeting)
+            closest, result = meeting.closest, self._meeting_events(meeting)
             misses_m = [meeting.beside_m, meeting.above_m]
             unsure = np.flatnonzero(meeting.unsure.any(axis=0) | self._is_class_unsure(meeting))
             if len(unsure):
                 few = Group(group.scene, [group.replicas[k] for k in unsure.tolist()], (), {})
-                for name, column in self._of_nominal(few).items():
+                for name, column in self._nominal_events(few).items():
                     result[name][unsure] = column
         if self._weight is not None:
             result |= self._weight.measure(group)
@@ -238,11 +238,11 @@ class RiskRatios(Mitigated):
         result[expected_column(_NEEDLESS)] = kept * _NEEDS * alone**-8.0
         return result
 
-    def _of_nominal(self, group: Group) -> dict[str, AnyArray]:
+    def _nominal_events(self, group: Group) -> dict[str, AnyArray]:
         """Return events and classes of flights without manoeuvres."""
         return {**super().nominal(group), **self._classes(group)}
 
-    def _of_meeting(self, meeting: Meetings) -> dict[str, AnyArray]:
+    def _meeting_events(self, meeting: Meetings) -> dict[str, AnyArray]:
         """Return events and classes by straight paths in the plane, where these decide."""
         return _events_of(meeting) | self._class_columns(*meeting.closest[5:])
 
@@ -261,7 +261,7 @@ class RiskRatios(Mitigated):
         """Return the classes of encounters, as without manoeuvres."""
         if not self.p.by:
             return {}
-        return self._class_columns(*self.of_flights(group, meeting_deg, steered=False))
+        return self._class_columns(*self.read_flights(group, meeting_deg, steered=False))
 
     def _class_columns(
         self, course_deg: FloatArray, bearing_deg: FloatArray

@@ -73,7 +73,7 @@ class Commands:
     turn_rad_s: FloatArray
 
     def take(self, rows: IntArray) -> "Commands":
-        """Return those of some tracks."""
+        """Return the commands of some tracks."""
         return Commands(*(values.take(rows, axis=-1) for values in vars(self).values()))
 
     def fly(self, dynamics: str) -> FlownTracks:
@@ -137,16 +137,16 @@ class TrackRules:
         return result
 
     def commands(self, tracks: SampledTracks) -> Commands:
-        """Return what tracks command, in feet and seconds."""
+        """Return the commands of tracks, in feet and seconds."""
         return Commands(
             self.altitude_ft(tracks),
             tracks.initial[self._index_of(SPEED)] * FT_S_PER_KT,
-            self._over_time(tracks, ACCELERATION) * FT_S_PER_KT,
-            self._over_time(tracks, CLIMB) / 60.0,
-            np.radians(self._over_time(tracks, TURN)),
+            self._values_by_second(tracks, ACCELERATION) * FT_S_PER_KT,
+            self._values_by_second(tracks, CLIMB) / 60.0,
+            np.radians(self._values_by_second(tracks, TURN)),
         )
 
-    def _over_time(self, tracks: SampledTracks, label: str) -> FloatArray:
+    def _values_by_second(self, tracks: SampledTracks, label: str) -> FloatArray:
         index, dynamic = self._index_of(label), self.model.dynamic
         if index in dynamic:
             result: FloatArray = tracks.changing[:, dynamic.index(index)]

@@ -91,15 +91,15 @@ class Weather(Parameters):
         description="Whether there is no daylight: cameras for visible light then see nothing.",
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of weather that is switched off."""
         said = []
         if not self.wind_mps:
-            said += self.idle("wind_from_deg", because="wind_mps is 0")
+            said += self.note_ineffective("wind_from_deg", because="wind_mps is 0")
         if not (self.rain_rate_mm_h or any(one.rain_rate_mm_h for one in self.cells)):
-            said += self.idle("rain_top_m", because="rain_rate_mm_h is 0")
+            said += self.note_ineffective("rain_top_m", because="rain_rate_mm_h is 0")
         if not (self.fog_water_g_m3 or any(one.fog_water_g_m3 for one in self.cells)):
-            said += self.idle(
+            said += self.note_ineffective(
                 "fog_base_m", "fog_top_m", "fog_temperature_c", because="fog_water_g_m3 is 0"
             )
         return said
@@ -306,11 +306,11 @@ class Terrain(Parameters):
         heights, inside = self.raster.raster.height(np.array([lat_deg]), np.array([lon_deg]))
         return float(heights[0]) + self.raster_zero_m if inside[0] else None
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of ground that is switched off, and on made-up ground."""
         said = []
         if self.raster is None:
-            said += self.idle("raster_offset_m", because="raster is not given")
+            said += self.note_ineffective("raster_offset_m", because="raster is not given")
         elif filled := self.raster.raster.filled:
             share = filled / self.raster.raster.height_m.size
             said.append(
@@ -320,8 +320,10 @@ class Terrain(Parameters):
         if self.height_m is None:
             keys = "clutter_gamma_db", "clutter_motion_m_s", "clutter_mean"
             mirrors = "facet_slope_deg", "roughness_m"
-            said += self.idle(*keys, *mirrors, because="height_m is not given")
+            said += self.note_ineffective(*keys, *mirrors, because="height_m is not given")
         if self.facet_slope_deg is None and self.roughness_m is None:
             water = "relative_permittivity", "conductivity_s_m"
-            said += self.idle(*water, because="roughness_m and facet_slope_deg are not given")
+            said += self.note_ineffective(
+                *water, because="roughness_m and facet_slope_deg are not given"
+            )
         return said

@@ -26,7 +26,7 @@ def within_disc(
     centre_east_m: FloatArray,
     radius_m: float,
 ) -> Within:
-    """Return what of straight paths from the origin lies above a disc on level ground.
+    """Return the part of straight paths from the origin above a disc on level ground.
 
     A path w from the origin enters and leaves a disc of radius r around c at shares
     (c·w -+ sqrt(r² w² - (c×w)²)) / w² of itself; one straight up is in it or not.
@@ -84,7 +84,7 @@ class WeatherCell(Parameters):
         line: Sequence[FloatArray],
         time_s: FloatArray,
     ) -> Within:
-        """Return what of lines of sight lies in it: azimuth from north, elevation and range."""
+        """Return the part of lines of sight inside the cell, given azimuth, elevation and range."""
         azimuth, elevation, range_m = line
         level_m = range_m * np.cos(elevation)
         way = level_m * np.cos(azimuth), level_m * np.sin(azimuth)

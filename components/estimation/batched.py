@@ -48,7 +48,7 @@ class Batch:
     """Records of arrays over many tracks, on their last axis; parts may be None, or lists."""
 
     def take(self, which: IntArray | slice) -> Self:
-        """Return those of some tracks."""
+        """Return the batch of some tracks."""
         return type(self)(*(_select_part(part, which) for part in vars(self).values()))
 
 

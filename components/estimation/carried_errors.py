@@ -119,7 +119,7 @@ class ReportedErrors:
     ahead_m: FloatArray | None = None
 
     def repeat(self, times: int) -> "ReportedErrors":
-        """Return them so many times, one after the other."""
+        """Return the errors repeated so many times."""
         return ReportedErrors(
             self.ways, np.tile(self.deviation, times), np.tile(self.age_s, times),
             np.tile(self.at_range, times),
@@ -161,13 +161,13 @@ class ReportedErrors:
         return np.concatenate([np.zeros((_MOVING, own.shape[1]), dtype=bool), own])
 
     def expected_measurement(self, kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
-        """Return what would be measured of states with these errors, (m, n)."""
+        """Return the expected measurements of states with these errors, (m, n)."""
         return expected_measurement(kind, self._reported_states(state, pose)[0], pose)
 
     def linearise(
         self, kind: Kind, state: FloatArray, pose: SensorPose
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the same, and its derivative by position, velocity and errors."""
+        """Return expected measurements, their derivative by position, velocity and errors."""
         reported, by_position, cylinder = self._reported_states(state, pose)
         seen, slope = linearise(kind, reported, pose)
         whole = np.zeros((len(seen), _MOVING + len(self.ways), seen.shape[1]))
@@ -305,7 +305,7 @@ class Ages:
     def add_age_errors(
         self, moments: Moments, model: Motion, state: FloatArray, covariance: FloatArray
     ) -> Moments:
-        """Return what is expected of measurements, with what ages add to it."""
+        """Return the moments of measurements with the errors that their ages add."""
         own = model.model if isinstance(model, MotionWithErrors) else model
         slope = np.ascontiguousarray(moments.jacobian[:, :_MOVING])
         if not isinstance(own, ConstantVelocity):

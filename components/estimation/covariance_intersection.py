@@ -37,7 +37,7 @@ _CLOSE = 1e-15
 def intersect_covariances(
     covariance: FloatArray, information: FloatArray, pull: FloatArray, rule: Rule
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what a second piece of information does to estimates."""
+    """Return the state's change, the covariance and the weight after covariance intersection."""
     root = cholesky(covariance)
     scaled = product(product(root.swapaxes(0, 1), information), root)
     # LAPACK takes matrix by matrix: the result does not depend on the company.

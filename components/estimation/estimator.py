@@ -53,7 +53,7 @@ class Estimates(NamedTuple):
     weights: FloatArray
 
     def take(self, which: IntArray) -> "Estimates":
-        """Return those of some tracks."""
+        """Return the estimates of some tracks."""
         if is_everything(which, self.weights.shape[1]):
             return self
         return Estimates(
@@ -131,7 +131,7 @@ class Estimator(Protocol):
         pose: SensorPose,
         reported: ReportedErrors | None = None,
     ) -> list[Moments]:
-        """Return what every model expects to be measured of predicted tracks.
+        """Return each model's moments of measurements of predicted tracks.
 
         `reported` are the errors of the measurements, of a filter that carries some.
         """
@@ -239,7 +239,7 @@ class ExtendedKalmanFilter(SingleModelFilter):
         pose: SensorPose,
         reported: ReportedErrors | None = None,
     ) -> list[Moments]:
-        """Return what is expected to be measured."""
+        """Return the moments of expected measurements."""
         how = linearise if reported is None else reported.linearise
         seen, jacobian = how(kind, tracks.states[0], pose)
         return [linear_moments(seen, jacobian, tracks.covariances[0])]

@@ -71,7 +71,7 @@ class InteractingMultipleModels(Estimator):
         pose: SensorPose,
         reported: ReportedErrors | None = None,
     ) -> list[Moments]:
-        """Return what every model expects to be measured."""
+        """Return each model's moments of expected measurements."""
         return [
             one.expect(kind, Estimates([x], [p], tracks.weights), pose, reported)[0]
             for one, x, p in zip(self.filters, tracks.states, tracks.covariances, strict=True)
@@ -118,7 +118,7 @@ def mix_models(
     fresh: Sequence[float] = (),
     shared: int = 6,
 ) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
-    """Return what each model starts from, and the models' probabilities before the look.
+    """Return each model's mixed estimate, and the models' probabilities before the look.
 
     `shared` components are in every model's state.
     """

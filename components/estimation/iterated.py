@@ -38,7 +38,7 @@ def iterate(
     is the innovation and `apart` the residual; their errors must be none that states carry. Updates
     within tolerance stay as they are, to the bit.
     """
-    left = np.flatnonzero(_bend(kind, pose, before[0], after[0], first) > _FAR)
+    left = np.flatnonzero(_tangent_deviation(kind, pose, before[0], after[0], first) > _FAR)
     if len(left) == 0:
         return
     state, covariance = select_tracks(before[0], left), select_tracks(before[1], left)
@@ -53,7 +53,7 @@ def iterate(
         here = innovation(seen, jacobian, covariance, variance)
         back = times(jacobian, (at - state)[: jacobian.shape[1]])
         moved, spread = update(state, covariance, here, residual(measured, seen) + back)
-        bend = _bend(kind, pose, at, moved, here)
+        bend = _tangent_deviation(kind, pose, at, moved, here)
         ends = np.flatnonzero(bend <= _NEAR)
         after[0][:, left[ends]], after[1][:, :, left[ends]] = moved[:, ends], spread[:, :, ends]
         rest = np.flatnonzero(bend > _NEAR)
@@ -64,7 +64,7 @@ def iterate(
         measured, variance = select_tracks(measured, rest), select_tracks(variance, rest)
 
 
-def _bend(
+def _tangent_deviation(
     kind: Kind, pose: SensorPose, state: FloatArray, moved: FloatArray, slope: Innovation
 ) -> FloatArray:
     """Return by how many deviations what is measured leaves the tangent at `state`, at `moved`."""

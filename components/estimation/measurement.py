@@ -38,7 +38,7 @@ class Kind:
 
 
 def expected_measurement(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
-    """Return what would be measured without error."""
+    """Return the measurement without error."""
     away = state[:3] - pose.position_m
     x, y, z = times(pose.to_body, away)
     seen = np.empty((kind.size, state.shape[-1]))
@@ -50,7 +50,7 @@ def expected_measurement(kind: Kind, state: FloatArray, pose: SensorPose) -> Flo
     if kind.has_range:
         seen[2] = distance
     if kind.has_range_rate:
-        closing = _closing(state, pose)
+        closing = _relative_velocity(state, pose)
         seen[2 + kind.has_range] = dot(away, closing) / np.maximum(distance, _NEAREST_M)
     if kind.has_velocity:
         seen[-3:] = state[3:6]
@@ -58,7 +58,7 @@ def expected_measurement(kind: Kind, state: FloatArray, pose: SensorPose) -> Flo
 
 
 def linearise(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatArray, FloatArray]:
-    """Return what would be measured, and its derivative by position and velocity."""
+    """Return the measurement without error, and its derivative by position and velocity."""
     away = state[:3] - pose.position_m
     turned = pose.to_body
     x, y, z = times(turned, away)
@@ -90,7 +90,7 @@ def linearise(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatArr
         seen[2] = distance
         jacobian[2, :3] = unit
     if kind.has_range_rate:
-        closing = _closing(state, pose)
+        closing = _relative_velocity(state, pose)
         rate = dot(away, closing) / distance
         row = 2 + kind.has_range
         seen[row] = rate
@@ -154,7 +154,7 @@ def position_of(measured: FloatArray, pose: SensorPose) -> tuple[FloatArray, Flo
     return pose.position_m + distance * unit, jacobian
 
 
-def _closing(state: FloatArray, pose: SensorPose) -> FloatArray:
+def _relative_velocity(state: FloatArray, pose: SensorPose) -> FloatArray:
     if pose.velocity_m_s is None:
         raise ValueError("a range rate needs the velocity of the sensor")
     return state[3:6] - pose.velocity_m_s

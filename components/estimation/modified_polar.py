@@ -160,7 +160,7 @@ def _apply_polar_change(
     covariance: FloatArray,
     sensor_m: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what a change of polar coordinates makes of state and covariance."""
+    """Return state and covariance after a change of polar coordinates."""
     row = to_polar[2:3]
     spread = multiply_by_transpose(product(row, covariance[:6, :6]), row)[0, 0]
     least = np.maximum(_LEAST * np.sqrt(np.maximum(spread, 0.0)), 1.0 / _FARTHEST_M)
@@ -170,7 +170,7 @@ def _apply_polar_change(
     moved = state.copy()
     moved[:3] = sensor_m + turned[0] / inverse
     moved[3:6] = sum(w * axis for w, axis in zip(by_range, turned, strict=True)) / inverse
-    step = product(_from_polar(turned, change[1], inverse, by_range), to_polar)
+    step = product(_derivative_by_polar(turned, change[1], inverse, by_range), to_polar)
     whole = covariance.copy()
     whole[:6, :6] = multiply_by_transpose(product(step, covariance[:6, :6]), step)
     if len(state) > 6:
@@ -221,7 +221,7 @@ def _rotate_axes(axes: list[FloatArray], one: FloatArray, other: FloatArray) -> 
     ]
 
 
-def _from_polar(
+def _derivative_by_polar(
     axes: list[FloatArray], other: FloatArray, inverse: FloatArray, by_range: FloatArray
 ) -> FloatArray:
     """Return the derivative of position and velocity by polar coordinates."""

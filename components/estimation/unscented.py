@@ -78,7 +78,7 @@ class UnscentedKalmanFilter(SingleModelFilter):
         pose: SensorPose,
         reported: ReportedErrors | None = None,
     ) -> list[Moments]:
-        """Return what is expected to be measured."""
+        """Return the moments of expected measurements."""
         (state,), (covariance,), _ = tracks
         return [unscented_moments(kind, state, covariance, pose, self.sigma, reported)]
 

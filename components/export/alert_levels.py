@@ -65,7 +65,7 @@ def alerts_of(run: RecordedTables) -> list[Alert]:
                 if about in on:
                     on.pop(about).end_s = time_s
             elif about not in on:
-                on[about] = Alert(block, row["target"], row.get("track"), [(time_s, level)])
+                on[about] = Alert(block, row["target"], row.get("track") or None, [(time_s, level)])
                 result.append(on[about])
             elif on[about].levels[-1][1] != level:
                 on[about].levels.append((time_s, level))
@@ -77,4 +77,4 @@ def _look(row: dict[str, Any]) -> tuple[float, str]:
 
 
 def _subject_of(row: dict[str, Any]) -> Any:
-    return row["target"] if row.get("track") is None else row["track"]
+    return row.get("track") or row["target"]  # tracks count from 1; 0 stands where there are none

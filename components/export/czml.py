@@ -29,9 +29,11 @@ def czml_text(run: RecordedTables) -> str:
         }
     ]  # fmt: skip
     for one in shown.flights:
-        packets.append(_moving(f"aircraft/{one.name}", one, 9, 2) | _label(one.name, one.colour))
+        packets.append(
+            _moving_point(f"aircraft/{one.name}", one, 9, 2) | _label(one.name, one.colour)
+        )
     for one in shown.tracks:
-        packets.append(_moving(f"track/{one.name}", one, 6, 1) | _label(one.name, one.colour))
+        packets.append(_moving_point(f"track/{one.name}", one, 6, 1) | _label(one.name, one.colour))
     for number, one in enumerate(shown.alerts):
         ring = {
             "pixelSize": 18, "color": {"rgba": [0, 0, 0, 0]},
@@ -69,7 +71,7 @@ def _course_packet(number: str, one: Course) -> dict[str, Any]:
     }
 
 
-def _moving(number: str, one: Course, size: int, width: int) -> dict[str, Any]:
+def _moving_point(number: str, one: Course, size: int, width: int) -> dict[str, Any]:
     colour = {"rgba": _rgba(one.colour)}
     path = {"width": width, "leadTime": 0, "material": {"solidColor": {"color": colour}}}
     return _course_packet(number, one) | {

@@ -78,7 +78,7 @@ class GlobeRun:
 
 
 def globe_run(run: RecordedTables) -> GlobeRun:
-    """Return what globes show of a run; `UsageError` where its tables are not those of one."""
+    """Return the contents of a globe view of a run; `UsageError` for tables of none."""
     flights = [
         Course(
             name, ON_DARK["own" if name == run.own_name else "truth"], flight["time_s"],
@@ -142,7 +142,7 @@ def seen_positions(run: RecordedTables) -> Iterator[DetectedPlace]:
     number = run.stack_columns("detections", names)
     there = np.flatnonzero(~np.isnan(number).any(axis=0))
     known = np.where(np.isnan(number), 0.0, number)
-    run.refuse_large("detections", dict(zip(names, known, strict=True)))
+    run.refuse_large_values("detections", dict(zip(names, known, strict=True)))
     if len(there) == 0:
         return
     number = run.stack_columns("detections", names, there)

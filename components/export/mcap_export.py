@@ -108,7 +108,7 @@ def _tables(run: RecordedTables) -> Iterator[_Message]:
             continue
         schema = _object(**{field.name: _column_schema(field) for field in table.schema})
         when = run.numbers(name, "time_s")
-        run.refuse_large(name, {"time_s": when})
+        run.refuse_large_values(name, {"time_s": when})
         for row, time_s in zip(table.to_pylist(), when.tolist(), strict=True):
             plain = {
                 key: None if isinstance(value, float) and not math.isfinite(value) else value

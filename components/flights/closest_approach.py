@@ -120,7 +120,7 @@ class Approaches:
 
     @classmethod
     def unknown(cls, targets: int) -> "Approaches":
-        """Return what is known before anything was looked at."""
+        """Return closest approaches at infinite range, before any time was compared."""
         return cls(np.full(targets, np.nan), np.full(targets, np.inf))
 
 

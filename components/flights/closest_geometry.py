@@ -86,7 +86,7 @@ def solve(approach: Approach) -> tuple[FloatArray, FloatArray, FloatArray, BoolA
     angle = np.arctan2(east, north) + side * off
     for _ in range(_ROUNDS):
         lat, lon, altitude = _place_paths(a, angle)
-        value = _closing(a, lat, lon, altitude)
+        value = _range_times_rate(a, lat, lon, altitude)
         # The derivative in the plane: Newton on the angle converges at once.
         slope = distance * (east * np.cos(angle) - north * np.sin(angle))
         step = np.where(possible & (np.abs(slope) > 0.0), value / np.where(slope, slope, 1.0), 0.0)
@@ -108,7 +108,9 @@ def _place_paths(a: Approach, angle: FloatArray) -> tuple[FloatArray, FloatArray
     return lat, lon, altitude
 
 
-def _closing(a: Approach, lat: FloatArray, lon: FloatArray, altitude: FloatArray) -> FloatArray:
+def _range_times_rate(
+    a: Approach, lat: FloatArray, lon: FloatArray, altitude: FloatArray
+) -> FloatArray:
     """Return Δr · Δv, in the level plane only where that is the sense."""
     own_lat, own_lon = np.full_like(lat, a.lat_deg), np.full_like(lat, a.lon_deg)
     n, e, d = line_of_sight_ned(own_lat, own_lon, a.altitude_m[0], lat, lon, altitude)

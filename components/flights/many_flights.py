@@ -131,7 +131,7 @@ class SteeredFleet(Growing, Fleet):
         return SteeredFlight(self._flights[ownship], self, ownship)
 
     def parts_of(self, ownship: int) -> Parts:
-        """Return what an ownship flies after its manoeuvres."""
+        """Return the parts of an ownship's flight after its manoeuvres."""
         count = int(self.manoeuvre_count[ownship])
         starts_s, numbers = self._start_s[ownship, :count], self._part[ownship, :count]
         return tuple(zip(starts_s.tolist(), map(self._flight_of, numbers.tolist()), strict=True))
@@ -280,7 +280,7 @@ class SteeredFleet(Growing, Fleet):
         ramps = ~np.isnan(given[:, _VELOCITY[0]])
         if ramps.any():
             mine, others = ramps.nonzero()[0], (~ramps).nonzero()[0]
-            fleet = self._with_parts(
+            fleet = self._append_parts(
                 ownship[mine], time_s[mine], ~(len(self._ramps) + np.arange(len(mine)))
             )
             fleet._ramps = self._ramps.with_flights(
@@ -295,7 +295,7 @@ class SteeredFleet(Growing, Fleet):
         before = [self._flown[part] if part >= 0 else None for part in last]
         every = [Manoeuvre(*row) for row in given.tolist()]
         flown = steered_parts("ownship", around, time_s, every, before)
-        fleet = self._with_parts(ownship, time_s, len(self._flown) + np.arange(len(flown)))
+        fleet = self._append_parts(ownship, time_s, len(self._flown) + np.arange(len(flown)))
         fleet._parts = self._parts.with_flights(ScriptedFleet(flown))
         return fleet.with_more(_flown=np.array(flown, dtype=object))
 
@@ -328,7 +328,7 @@ class SteeredFleet(Growing, Fleet):
         fastest = np.maximum(np.hypot(*velocity), np.hypot(east, north))
         return Ramps(time_s, table, fastest)
 
-    def _with_parts(self, ownship: IntArray, time_s: FloatArray, part: IntArray) -> SteeredFleet:
+    def _append_parts(self, ownship: IntArray, time_s: FloatArray, part: IntArray) -> SteeredFleet:
         """Return the flights with a new part of each of some ownships from times on."""
         fleet = copy(self)
         fleet.__dict__.pop("max_speeds_mps", None)

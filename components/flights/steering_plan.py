@@ -78,7 +78,7 @@ class SteeringPlan(NamedTuple):
     speed_mps: float
 
     def remaining_after(self, elapsed_s: float) -> SteeringPlan:
-        """Return what is left of it after some time."""
+        """Return the rest of the plan after some time."""
         return self._replace(
             turns=_remaining_pieces(self.turns, elapsed_s),
             climbs=_remaining_pieces(self.climbs, elapsed_s),
@@ -86,7 +86,7 @@ class SteeringPlan(NamedTuple):
         )
 
     def with_manoeuvre(self, manoeuvre: Manoeuvre, alt_m: float, turning: Turning) -> SteeringPlan:
-        """Return it with the parts that a manoeuvre changes, from an altitude; the others stay."""
+        """Return the plan changed by a manoeuvre, from an altitude; its other parts stay."""
         plan = self
         speed_now_mps = _mean(self.speeds, 0.0, self.speed_mps)
         if manoeuvre.eases_rad > 0.0:
@@ -117,7 +117,7 @@ class SteeringPlan(NamedTuple):
         return plan
 
     def legs(self) -> list[Straight | Turn]:
-        """Return it as legs, each as long as nothing changes; the last one is for ever."""
+        """Return the plan as legs of constant rates; the last one never ends."""
         legs: list[Straight | Turn] = []
         plan = self
         while plan.turns or plan.climbs or plan.speeds:
@@ -226,7 +226,7 @@ def steered_parts(
     manoeuvres: Sequence[Manoeuvre],
     before: Sequence[SteeredPart | None],
 ) -> list[SteeredPart]:
-    """Return what aircraft fly from a manoeuvre on.
+    """Return the parts of aircraft's flights from a manoeuvre on.
 
     `around` says where each would be without it, (n, 3), at `times_around_s`. Parts of an
     earlier manoeuvre, `before`, that are not commanded anew go on.

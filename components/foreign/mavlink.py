@@ -16,7 +16,7 @@ from components.estimation.frame import vectors_in_frame
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
 from components.geometry import POSITION_FIELDS, enu_to_geodetic, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
-from components.messages.detections import without_range
+from components.messages.detections import describe_rangeless
 from components.messages.state_tracks import COASTED, CONFIRMED, STALE_S, StateTracks
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
@@ -179,10 +179,10 @@ class Mavlink(Component):
 
     def warnings(self) -> list[str]:
         """Warn that no sensor measures range: tracks without one are not sent."""
-        blind = without_range(one for one in self.context.producers if one.port == "estimates")
+        blind = describe_rangeless(one for one in self.context.producers if one.port == "estimates")
         return [f"{blind} measures no range: no track is sent"] if blind else []
 
-    def undone(self) -> dict[str, tuple[int, int]]:
+    def failure_counts(self) -> dict[str, tuple[int, int]]:
         """Return how many tracks had no range and were not sent."""
         if not self._heard:
             return {}
@@ -218,14 +218,14 @@ class Mavlink(Component):
             self._next_beat_s = time_s + 1.0
             datagrams.insert(0, self._link.heartbeat())
         self._udp.send(datagrams)
-        self._take(time_s)
+        self._read_messages(time_s)
         told = self._follow(int(wake.ticks[0]), own)
         found: dict[str, Message] = {"autopilot": _row(wake, self._says)}
         if told is not None:
             found["manoeuvres"] = Manoeuvres.of([int(wake.ticks[0])], [told])
         return found
 
-    def _take(self, time_s: float) -> None:
+    def _read_messages(self, time_s: float) -> None:
         """Read all messages that have come; wait for this instant's reply if one is required."""
         # Its own times are whole milliseconds.
         wanted_s = math.floor(1e3 * time_s) / 1e3

@@ -105,7 +105,7 @@ class Link:
         return bytes(made.pack(self._ours))
 
     def update(self, datagram: bytes, before: AutopilotSays) -> AutopilotSays:
-        """Return what is known after a datagram; garbage and other messages change nothing."""
+        """Return the state after a datagram; garbage and other messages change nothing."""
         says = before
         # A datagram is whole: what a broken one leaves over must not swallow the next.
         theirs = self._dialect.MAVLink(None)

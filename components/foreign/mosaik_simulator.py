@@ -110,7 +110,7 @@ class ChainOfMosaik(MosaikApi):
         return round(self._chain.next_scan_s() * per_s) // self._step_ticks
 
     def get_data(self, outputs: Mapping[str, Iterable[str]]) -> dict[str, dict[str, Any]]:
-        """Return what was detected at the last step."""
+        """Return the detections of the last step."""
         found: dict[str, dict[str, Any]] = {}
         for entity, attributes in outputs.items():
             if entity == self._ownship:

@@ -102,13 +102,15 @@ class ProcessParameters(Parameters):
         beside = Path(self.folder or ".") / name
         return shutil.which(str(beside.absolute()) if "/" in name else name)
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key that has no effect."""
-        said = [] if self.on_failure == "restart" else self.idle(
+        said = [] if self.on_failure == "restart" else self.note_ineffective(
             "most_restarts", because='as on_failure is "stop"'
         )  # fmt: skip
         return said + (
-            [] if self.scan_rate_hz else self.idle("offset_s", because="without scan_rate_hz")
+            []
+            if self.scan_rate_hz
+            else self.note_ineffective("offset_s", because="without scan_rate_hz")
         )
 
 
@@ -141,7 +143,7 @@ class Process(Component):
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
-        """Return when it is called without being sent anything, if it is."""
+        """Return the clock by which the program is called without input, if any."""
         rate = parameters.scan_rate_hz
         return None if rate is None else ClockSpec(rate, parameters.offset_s)
 
@@ -168,7 +170,7 @@ class Process(Component):
     def start(self) -> None:
         """Start the program ahead of the first call."""
         if not self._link.runs:
-            self._greet()
+            self._start_program()
 
     # -- calls ---------------------------------------------------------------------------------
 
@@ -218,7 +220,7 @@ class Process(Component):
             self._state = self._is_in.state = after[0].column(0)[0].as_py()
         return [(about, table) for about, table in answer if about.get("table") != _STATE]
 
-    def _greet(self) -> None:
+    def _start_program(self) -> None:
         self._link.start()
         about = {
             "version": VERSION, "block": self.name, "ticks_per_s": str(self.context.ticks_per_s),
@@ -272,8 +274,8 @@ class Process(Component):
                 self._roster = found
         return self._roster or Roster.from_pairs([])
 
-    def undone(self) -> dict[str, tuple[int, int]]:
-        """Return how often it was asked, where it never had anything to say."""
+    def failure_counts(self) -> dict[str, tuple[int, int]]:
+        """Return how often the program was called, where it never answered with a row."""
         if self._answers or not self._calls:
             return {}
         return {"it was asked and answered with no row": (self._calls, self._calls)}

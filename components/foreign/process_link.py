@@ -152,7 +152,7 @@ class ProcessLink:
             return
         if not content:
             raise ProcessError(
-                self._how_it_ended() + (" in the middle of a message" if reader.is_partial else "")
+                self._describe_end() + (" in the middle of a message" if reader.is_partial else "")
             )
         reader.add(content)
 
@@ -165,7 +165,7 @@ class ProcessLink:
             return bool(said)
         return True
 
-    def _how_it_ended(self) -> str:
+    def _describe_end(self) -> str:
         with suppress(subprocess.TimeoutExpired):
             return describe_exit(self._process.wait(1.0))
         return "closed its output"

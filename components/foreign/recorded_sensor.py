@@ -92,12 +92,12 @@ class RecordedSensorParameters(Parameters):
             raise Disagreements([f"{missing[0]}: needed with the other two of {', '.join(keys)}"])
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key that has no effect."""
         if self.place is None or self.file.suffix in _RADARS:
             return []
         keys = ("radar_lat_deg", "radar_lon_deg", "radar_alt_m")
-        return self.idle(*keys, because="the file is no ASTERIX")
+        return self.note_ineffective(*keys, because="the file is no ASTERIX")
 
 
 class RecordedSensor(Component):

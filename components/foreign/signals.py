@@ -17,14 +17,14 @@ class Words:
         self.words = list(words)
 
     def take_rows(self, rows: slice | IntArray) -> "Words":
-        """Return those of some entries."""
+        """Return the words of some entries."""
         if isinstance(rows, slice):
             return Words(self.words[rows])
         return Words([self.words[i] for i in rows.tolist()])
 
     @classmethod
     def join_rows(cls, parts: Sequence["Words"]) -> "Words":
-        """Return those of several messages, one after the other."""
+        """Return the words of several messages, one after the other."""
         return cls([word for part in parts for word in part.words])
 
 

@@ -91,14 +91,14 @@ def record_asterix(
     an aircraft that reports none its geometric height; with `altitude`, those of that kind alone.
     Times count from the day's midnight, or in UTC where an instant near the first record is known.
     """
-    records, warnings = _records(Path(problems.path), data)
+    records, warnings = read_records(Path(problems.path), data)
     problems.of = "record"
     day_s = 0.0
     if of_day_s is not None and records:
         day_s = DAY_S * round((of_day_s - records[0].time_s) / DAY_S)
     names = _names(records)
     if not names:
-        records = _of_plots(problems, records, place, warnings)
+        records = _identify_plots(problems, records, place, warnings)
         names = _names(records)
     kinds: list[Altitude] = ["barometric", "geometric"] if altitude is None else [altitude]
     heights = dict(zip(("alt", "alt instead"), kinds, strict=False))
@@ -146,7 +146,7 @@ def record_asterix(
     )  # fmt: skip
 
 
-def _of_plots(
+def _identify_plots(
     problems: Problems,
     records: list[AsterixRecord],
     place: tuple[float, float, float] | None,
@@ -247,7 +247,7 @@ def read_asterix_plots(
         data = read_input_bytes(Path(path)) if data is None else data
     except InputFileError as error:
         raise TrafficFileError(str(path), [str(error)]) from None
-    records, notes = _records(Path(path), data)
+    records, notes = read_records(Path(path), data)
     radars = sorted({_source(r) for r in records if r.category == PLOTS})
     if not radars:
         raise TrafficFileError(str(path), ["there are no plots of a radar (048) in it"])
@@ -317,16 +317,6 @@ def _elevations(
     with np.errstate(divide="ignore", invalid="ignore"):
         sine = (rise * (2.0 * radius + rise) - far_m**2) / (2.0 * radius * far_m)
     return np.arcsin(np.clip(sine, -1.0, 1.0))
-
-
-def _records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str]]:
-    """Return the records, each once, and what was left out."""
-    records, notes = read_records(path, data)
-    # What is sent on two addresses is recorded twice.
-    once = {(r.category, r.time_s, tuple(r.values.items())): r for r in records}
-    if again := len(records) - len(once):
-        notes.append(f"{again} records stand there again and count once")
-    return list(once.values()), notes
 
 
 def _source(record: AsterixRecord) -> str:

@@ -226,7 +226,7 @@ def _items(record: AsterixRecord) -> dict[str, Any]:
     """Return a record's items as the library makes them."""
     values = {**record.values, "time_of_day_s": record.time_s}
     raw = {
-        f"={name}": _raw(record, name, field, values[name])
+        f"={name}": _raw_value(record, name, field, values[name])
         for name, field in FIELDS[record.category].items()
         if values.get(name) is not None
     }
@@ -246,7 +246,7 @@ def _fill_pattern(pattern: Any, raw: Mapping[str, Any]) -> Any:
     return raw[pattern] if isinstance(pattern, str) and pattern.startswith("=") else pattern
 
 
-def _raw(record: AsterixRecord, name: str, field: _Field, value: Any) -> Any:
+def _raw_value(record: AsterixRecord, name: str, field: _Field, value: Any) -> Any:
     """Return a quantity as the whole number that its bits hold, or a text as it is."""
     if name == "name":
         return value
@@ -267,7 +267,7 @@ def _raw(record: AsterixRecord, name: str, field: _Field, value: Any) -> Any:
 
 
 def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str]]:
-    """Return the records of the categories that we know, in the order of the file, and notes.
+    """Return the records of the categories that we know, each once, in order, and notes.
 
     TrafficFileError says at which byte what is no data block or no record begins.
     """
@@ -275,20 +275,21 @@ def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str
     records: list[AsterixRecord] = []
     left_out: dict[int, int] = {}
     now_s = math.nan
-    timeless = 0
+    timeless, again = 0, 0
+    seen: set[tuple[int, float, bytes]] = set()  # what is sent on two addresses comes twice
     for at, category, raw in _blocks(path, data):
         if category not in cats:
             left_out[category] = left_out.get(category, 0) + 1
             continue
         here = 0
         while here < len(raw):
-            values: dict[str, Any] = {}
+            values, begin = dict[str, Any](), here
             try:
                 here = readers[category](raw, here, values)
                 if here > len(raw):
                     raise ValueError("insufficient data")
             except (ValueError, IndexError) as error:
-                raise _wrong(
+                raise _block_error(
                     path, at, f"its records are none of category {category:03d}, edition "
                     f"{'.'.join(map(str, cats[category].cv_edition))} ({error})"
                 ) from None  # fmt: skip
@@ -299,6 +300,10 @@ def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str
             if now_s == now_s:  # the day on which it is nearest to the record before
                 time_s += DAY_S * round((now_s - time_s) / DAY_S)
             now_s = time_s
+            if (key := (category, time_s, raw[begin:here])) in seen:
+                again += 1
+                continue
+            seen.add(key)
             records.append(AsterixRecord(category, time_s, values))
     notes = [
         f"{count} data blocks of category {category:03d} were left out"
@@ -306,10 +311,12 @@ def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str
     ]
     if timeless:
         notes.append(f"{timeless} records without a time of day were left out")
+    if again:
+        notes.append(f"{again} records stand there again and count once")
     return records, notes
 
 
-def _wrong(path: Path, at: int, problem: str) -> TrafficFileError:
+def _block_error(path: Path, at: int, problem: str) -> TrafficFileError:
     return TrafficFileError(str(path), [f"the data block at byte {at}: {problem}"])
 
 
@@ -321,9 +328,9 @@ def _blocks(path: Path, data: bytes) -> Iterator[tuple[int, int, bytes]]:
     while at < len(data):
         size = int.from_bytes(data[at + 1 : at + 3], "big")
         if size < 3 or at + 3 > len(data):
-            raise _wrong(path, at, "says that it has less than 3 bytes: this is no ASTERIX")
+            raise _block_error(path, at, "says that it has less than 3 bytes: this is no ASTERIX")
         if at + size > len(data):
-            raise _wrong(path, at, f"has {size} bytes, but the file ends at byte {len(data)}")
+            raise _block_error(path, at, f"has {size} bytes, but the file ends at byte {len(data)}")
         yield at, data[at], data[at + 3 : at + size]
         at += size
 

@@ -14,17 +14,17 @@ import numpy as np
 
 from components.formats.receiver_logs import UNKNOWN_JSON, log_of
 from components.formats.recording import Recording
-from components.formats.reports import recording_of
+from components.formats.reports import build_recording
 from components.formats.sample_columns import (
     VELOCITIES,
     Altitude,
     ColumnSpec,
     SampleColumn,
     complete_velocity,
-    in_epoch_units,
     indices_of,
     is_missing,
     name_and_unit,
+    resolve_epoch_unit,
     time_parser,
     unit_factor,
     with_velocity,
@@ -34,12 +34,12 @@ from components.formats.text_rows import (
     Problems,
     TrafficFile,
     did_you_mean,
-    each_line,
+    iterate_lines,
     quoted_rows,
     read_content,
     shown_columns,
+    strip_frame,
     text_of,
-    without_frame,
 )
 
 _GEOMETRIC = ("geoaltitude", "altgeom", "geomaltitude", "geometricaltitude", "gnssaltitude")
@@ -130,10 +130,10 @@ def read_csv(
     data = read_content(Path(path), problems)
     log = log_of(problems, data)
     if log is not None:
-        return recording_of(problems, log, ownship, altitude).flights()
+        return build_recording(problems, log, ownship, altitude).flights()
     if data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
         problems.fail(UNKNOWN_JSON)
-    lines = each_line(text_of(data, problems))
+    lines = iterate_lines(text_of(data, problems))
     del data  # of many rows it is not held beside their samples
     return record_table(problems, lines, ownship, altitude).flights()
 
@@ -148,7 +148,7 @@ def record_table(
     """Return the aircraft of a table, see `read_csv`: two or more, or any, called as its `stem`
     where there is no column of names.
     """
-    (header_line, header_text), body = _header_and_rows(problems, without_frame(lines))
+    (header_line, header_text), body = _header_and_rows(problems, strip_frame(lines))
     header_text = header_text.lstrip("#").strip(" ")
     delimiter = next((d for d in (",", ";", "\t", "|") if d in header_text), " ")
     ((_, headers),) = quoted_rows(iter([(header_line, header_text)]), delimiter)
@@ -185,7 +185,7 @@ def record_rows(
     other = next((plain.index(name) for name in _CLOCKS if name in plain), time)
     ahead = _until_a_time(rows, time, other)
     if ahead and (begins := _time_cell(ahead[-1][1], time, other)):
-        columns["time"] = in_epoch_units(columns["time"], begins, headers[time], notes)
+        columns["time"] = resolve_epoch_unit(columns["time"], begins, headers[time], notes)
     table = SampleTable(
         problems, headers, identity, columns, time_parser(columns["time"]),
         columns.keys() - _NEEDED, gaps=True, shared=not is_address,

@@ -29,7 +29,7 @@ from components.formats.text_rows import (
     cells,
     clean_token,
     did_you_mean,
-    each_line,
+    iterate_lines,
     read_content,
     shown_columns,
     text_of,
@@ -95,7 +95,7 @@ def read_daa(
     problems = Problems(str(path))
     text = text_of(read_content(Path(path), problems), problems)
     reference = (reference_lat_deg, reference_lon_deg, reference_alt_m)
-    return record_daa(problems, each_line(text), reference).flights()
+    return record_daa(problems, iterate_lines(text), reference).flights()
 
 
 def record_daa(
@@ -127,7 +127,7 @@ def read_daa_samples(
     """
     problems = Problems(str(path))
     text = text_of(read_content(Path(path), problems), problems)
-    table, _ = _table(problems, each_line(text), extra)
+    table, _ = _table(problems, iterate_lines(text), extra)
     return {name: with_velocity(samples) for name, samples in table.samples(None).items()}
 
 

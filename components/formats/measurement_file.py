@@ -168,7 +168,9 @@ def _of_asterix(
 def _read_table(path: Path, needed: tuple[str, ...], block: str | None) -> _Table:
     table = _Table(path, Problems(str(path)))
     try:
-        names = _of_parquet(table) if path.suffix == ".parquet" else _of_csv(table)
+        names = (
+            _read_parquet_header(table) if path.suffix == ".parquet" else _read_csv_header(table)
+        )
     except InputFileError as error:
         table.problems.fail(f"the file {error}")
     for name in needed:
@@ -181,7 +183,7 @@ def _read_table(path: Path, needed: tuple[str, ...], block: str | None) -> _Tabl
     return table
 
 
-def _of_csv(table: _Table) -> list[str]:
+def _read_csv_header(table: _Table) -> list[str]:
     def fail(what: str, line: int) -> Exception:
         table.problems.add(what, line=line)
         try:
@@ -218,7 +220,7 @@ def _number(table: _Table, row: int, name: str, cell: str) -> float:
     return math.nan
 
 
-def _of_parquet(table: _Table) -> list[str]:
+def _read_parquet_header(table: _Table) -> list[str]:
     content = read_input_bytes(table.path)
     import pyarrow as pa
     import pyarrow.parquet as pq

@@ -183,7 +183,7 @@ def read_encounters(
                 alone = None
             elif alone is not None:
                 raise _one_aircraft(alone[0])
-            encounters.append(encounter_of(_from_their_start(tracks)))
+            encounters.append(encounter_of(_shift_to_start(tracks)))
             numbers.append(number)
             if origin is not None:
                 origins.append(origin)
@@ -205,7 +205,7 @@ def _one_aircraft(path: Path) -> EncounterSetError:
     return EncounterSetError(f"{path}: has one aircraft: an ownship and an intruder are needed")
 
 
-def _from_their_start(tracks: list[Track]) -> list[Track]:
+def _shift_to_start(tracks: list[Track]) -> list[Track]:
     """Return the tracks of an encounter, times of a clock from its start."""
     start_s = min(float(track[0][0]) for track in tracks)
     if start_s < EPOCH_S:

@@ -17,7 +17,7 @@ from typing import Any
 
 from components.arguments.units import FOOT_M, KNOT_M_S
 from components.formats.reports import Log, PositionReport
-from components.formats.text_rows import Problems, each_line, text_of
+from components.formats.text_rows import Problems, iterate_lines, text_of
 
 _FPM = FOOT_M / 60.0
 #: How old a velocity message of SBS may be beside a position, s.
@@ -34,7 +34,7 @@ def log_of(problems: Problems, data: bytes) -> Log | None:
     callsigns: dict[str, str] = {}
     # It may begin within a line, where somebody began to listen.
     if re.search(rb"^(?:MSG|MLAT|SEL|ID|AIR|STA|CLK),\s*\d*,", head, re.MULTILINE):
-        reports = _of_sbs(problems, data, callsigns)
+        reports = _read_sbs(problems, data, callsigns)
         return Log("BaseStation (SBS-1) messages", _FEET, reports, callsigns)
     if not head.startswith((b"{", b"[")):
         return None
@@ -208,7 +208,9 @@ def _subtract_age(time_s: Any, age_s: Any) -> Any:
     return time_s - age_s if isinstance(age_s, int | float) else time_s
 
 
-def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+def _read_aircraft_json(
+    one: Mapping[str, Any], callsigns: dict[str, str]
+) -> Iterator[PositionReport]:
     """Yield the position reports of an ``aircraft.json``, at the times of their reception."""
     for craft in one["aircraft"]:
         name = str(craft["hex"])
@@ -223,16 +225,18 @@ def _of_aircraft(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[
         )  # fmt: skip
 
 
-def _of_interface(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+def _read_adsb_exchange(
+    one: Mapping[str, Any], callsigns: dict[str, str]
+) -> Iterator[PositionReport]:
     """Yield the aircraft in an answer of ADS-B Exchange: as readsb's, with the time in ms."""
-    yield from _of_aircraft({"now": one["now"] / 1000.0, "aircraft": one["ac"]}, callsigns)
+    yield from _read_aircraft_json({"now": one["now"] / 1000.0, "aircraft": one["ac"]}, callsigns)
 
 
 #: Of a trace's flags: its altitude is geometric.
 _GEOMETRIC = 8
 
 
-def _of_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+def _read_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
     """Yield the points of a trace: seconds after its timestamp, position, altitude, and more."""
     name = str(one["icao"])
     for point in one["trace"]:
@@ -248,7 +252,9 @@ def _of_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Pos
         )  # fmt: skip
 
 
-def _of_path(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+def _read_opensky_path(
+    one: Mapping[str, Any], callsigns: dict[str, str]
+) -> Iterator[PositionReport]:
     """Yield the points of a flight path from OpenSky, which have no speeds."""
     name = str(one["icao24"])
     if one.get("callsign"):
@@ -257,7 +263,9 @@ def _of_path(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Posi
         yield PositionReport(name, time_s, lat, lon, None, barometric)
 
 
-def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+def _read_opensky_states(
+    one: Mapping[str, Any], callsigns: dict[str, str]
+) -> Iterator[PositionReport]:
     """Yield OpenSky's state vectors, at the instants of their positions."""
     for state in one["states"] or ():
         name, callsign, _, time_s, _, lon, lat, barometric, _, gs, trk, climb = state[:12]
@@ -267,7 +275,9 @@ def _of_states(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Po
         yield PositionReport(str(name), time_s, lat, lon, geometric, barometric, trk, gs, climb)
 
 
-def _of_feed(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+def _read_flightradar24_feed(
+    one: Mapping[str, Any], callsigns: dict[str, str]
+) -> Iterator[PositionReport]:
     """Yield all aircraft of FlightRadar24's live feed, each a list keyed by its flight number."""
     for state in one.values():
         if isinstance(state, list):
@@ -282,7 +292,9 @@ def _of_feed(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[Posi
             )  # fmt: skip
 
 
-def _of_playback(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+def _read_flightradar24_playback(
+    one: Mapping[str, Any], callsigns: dict[str, str]
+) -> Iterator[PositionReport]:
     """Yield the points of a FlightRadar24 playback, in which 0 ft means on the ground."""
     flight = one["result"]["response"]["data"]["flight"]
     called = flight["identification"]
@@ -296,7 +308,9 @@ def _of_playback(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[
         )  # fmt: skip
 
 
-def _of_details(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[PositionReport]:
+def _read_flightradar24_details(
+    one: Mapping[str, Any], callsigns: dict[str, str]
+) -> Iterator[PositionReport]:
     """Yield the trail in FlightRadar24's details of a flight, which has no climb rate."""
     called = one["identification"]
     name = str((one.get("aircraft") or {}).get("hex") or called["id"])
@@ -311,21 +325,41 @@ def _of_details(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[P
 #: By the keys that a document has: what it is called, and what reads it.
 _FEET = "ft and kt"
 _JSON: tuple[tuple[frozenset[str], str, str, _Reader], ...] = (
-    (frozenset({"now", "aircraft"}), "aircraft.json of readsb", _FEET, _of_aircraft),
-    (frozenset({"now", "ac"}), "aircraft of ADS-B Exchange's interface", _FEET, _of_interface),
-    (frozenset({"icao", "timestamp", "trace"}), "a trace of readsb", _FEET, _of_trace),
-    (frozenset({"time", "states"}), "OpenSky's states", "m and m/s", _of_states),
-    (frozenset({"icao24", "path"}), "a track of OpenSky", "m", _of_path),
-    (frozenset({"full_count", "version"}), "FlightRadar24's live feed", _FEET, _of_feed),
-    (frozenset({"result", "_api"}), "FlightRadar24's playback", _FEET, _of_playback),
-    (frozenset({"identification", "trail"}), "FlightRadar24's details", _FEET, _of_details),
+    (frozenset({"now", "aircraft"}), "aircraft.json of readsb", _FEET, _read_aircraft_json),
+    (
+        frozenset({"now", "ac"}),
+        "aircraft of ADS-B Exchange's interface",
+        _FEET,
+        _read_adsb_exchange,
+    ),
+    (frozenset({"icao", "timestamp", "trace"}), "a trace of readsb", _FEET, _read_trace),
+    (frozenset({"time", "states"}), "OpenSky's states", "m and m/s", _read_opensky_states),
+    (frozenset({"icao24", "path"}), "a track of OpenSky", "m", _read_opensky_path),
+    (
+        frozenset({"full_count", "version"}),
+        "FlightRadar24's live feed",
+        _FEET,
+        _read_flightradar24_feed,
+    ),
+    (
+        frozenset({"result", "_api"}),
+        "FlightRadar24's playback",
+        _FEET,
+        _read_flightradar24_playback,
+    ),
+    (
+        frozenset({"identification", "trail"}),
+        "FlightRadar24's details",
+        _FEET,
+        _read_flightradar24_details,
+    ),
 )
 
 
-def _of_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Reports:
+def _read_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Reports:
     """Join the messages of each aircraft: positions with the last velocity, if it is recent."""
     moves: dict[str, tuple[float, tuple[Any, ...]]] = {}
-    lines = each_line(text_of(data, problems))
+    lines = iterate_lines(text_of(data, problems))
     del data
     days: dict[str, float | None] = {}
     for number, line in lines:

@@ -52,7 +52,7 @@ _ANGLES = ("yaw", "pitch", "roll")
 _PLACE = {name: place for place, name in enumerate(PositionReport._fields)}
 
 
-def recording_of(
+def build_recording(
     problems: Problems, log: Log, ownship: str | None = None, altitude: Altitude | None = None
 ) -> Recording:
     """Return the aircraft of a log; the ownship is the first, or called by its name or callsign.

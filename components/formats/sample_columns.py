@@ -122,7 +122,9 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
     return re.sub(r"[\s_\-.]", "", header).lower(), unit
 
 
-def in_epoch_units(column: SampleColumn, cell: str, header: str, notes: list[str]) -> SampleColumn:
+def resolve_epoch_unit(
+    column: SampleColumn, cell: str, header: str, notes: list[str]
+) -> SampleColumn:
     """Return the column of time in the unit that its first number must be in."""
     if name_and_unit(header)[1] is not None or not re.fullmatch(r"\d{12,19}(\.\d*)?", cell):
         return column

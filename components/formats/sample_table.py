@@ -127,7 +127,7 @@ class SampleTable:
             except ValueError:
                 value = math.nan
             if not low <= value <= high or "_" in cell:
-                found = self._unusual(line, quantity, cell)
+                found = self._read_unusual_cell(line, quantity, cell)
                 whole, value = whole and found is not None, found or 0.0
             numbers.append(value)
         if whole:
@@ -155,7 +155,7 @@ class SampleTable:
             self._aircraft[name] = GrowingColumns(self._columns)
         return self._aircraft[name]
 
-    def _unusual(self, line: int, quantity: str, cell: str) -> float | None:
+    def _read_unusual_cell(self, line: int, quantity: str, cell: str) -> float | None:
         """Return what a cell means that is no plain number: NaN for none, None for a problem."""
         if quantity in self._optional:
             return math.nan
@@ -163,7 +163,7 @@ class SampleTable:
             return math.nan
         return self._number(line, quantity, self._columns[quantity], cell)
 
-    def _which(self, key: str) -> str:
+    def _describe_columns(self, key: str) -> str:
         """Return the column that a quantity is of, or the two."""
         first, second = (self._columns.get(one) for one in (key, self._instead.get(key, "")))
         whom = len(self._second.get(key, ()))
@@ -185,7 +185,11 @@ class SampleTable:
     def recording(self, ownship: str | None, to_geodetic: Converter, **said: Any) -> Recording:
         """Check each aircraft's samples and return them; `said` is what `Recording` says of it."""
         samples = {name: to_geodetic(one) for name, one in self.samples(ownship).items()}
-        said = {"height": self._which("alt"), "above_sea": self._above_sea(samples), **said}
+        said = {
+            "height": self._describe_columns("alt"),
+            "above_sea": self._above_sea(samples),
+            **said,
+        }
         return Recording(self._problems, samples, self.notes, **said)
 
     def finish(self, ownship: str | None, to_geodetic: Converter) -> TrafficFile:
@@ -194,12 +198,12 @@ class SampleTable:
 
     def samples(self, ownship: str | None) -> dict[str, dict[str, FloatArray]]:
         """Check each aircraft's samples and return them as columns, in the order of time."""
-        kept = self._without_gaps()
+        kept = self._drop_gaps()
         if self._shared:
             kept = rename_duplicates(kept, self.notes)
         names = list(kept)
         if not names:
-            lacking = self._lacking(" or ")
+            lacking = self._describe_missing_quantities(" or ")
             of = f": all {self._kind_of_rows} have {lacking}" if lacking else " in it"
             self._problems.fail(
                 f"there are no samples{of}; time, latitude, longitude and height are needed"
@@ -221,7 +225,7 @@ class SampleTable:
         self._problems.raise_if_any()
         return {own: samples.pop(own), **samples}
 
-    def _without_gaps(self) -> dict[str, tuple[IntArray, dict[str, FloatArray]]]:
+    def _drop_gaps(self) -> dict[str, tuple[IntArray, dict[str, FloatArray]]]:
         """Return the lines and columns of each aircraft; rows and columns with gaps are gone."""
         kept = {}
         self._lacks: dict[str, int] = {}
@@ -286,11 +290,11 @@ class SampleTable:
         self._note_second_columns()
         if left_out:
             of = self._kind_of_rows[:-1] + " was" if left_out == 1 else f"{self._kind_of_rows} were"
-            what = f"{left_out} {of} left out that had {self._lacking(' or ')}"
+            what = f"{left_out} {of} left out that had {self._describe_missing_quantities(' or ')}"
             self.notes.warnings.append(what + (f", {absent} aircraft wholly" if absent else ""))
         return kept
 
-    def _lacking(self, between: str) -> str:
+    def _describe_missing_quantities(self, between: str) -> str:
         """Return what rows lacked that were left out."""
         kinds = ("time", "position", "height")
         return between.join(f"no {kind}" for kind in kinds if kind in self._lacks)

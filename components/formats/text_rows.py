@@ -26,25 +26,25 @@ from dsa_des.files.input_files import (
 from dsa_des.text.safe_text import shorten
 
 
-def _named(*units: tuple[str, float]) -> dict[str, float]:
+def _factors_by_name(*units: tuple[str, float]) -> dict[str, float]:
     """Return what units are worth by each of their names."""
     return {name: worth for names, worth in units for name in names.split()}
 
 
-LENGTH_M = _named(
+LENGTH_M = _factors_by_name(
     ("m metre metres meter meters", 1.0), ("km", 1000.0), ("cm", 0.01), ("mm", 0.001),
     ("ft foot feet", FOOT_M), ("nmi nm", NAUTICAL_MILE_M),
 )  # fmt: skip
-SPEED_MPS = _named(
+SPEED_MPS = _factors_by_name(
     ("m/s mps", 1.0), ("km/h kph kmh", 1.0 / 3.6),
     ("knot knots kn kt kts", NAUTICAL_MILE_M / 3600.0), ("mph mi/h", 1609.344 / 3600.0),
     ("cm/s", 0.01), ("nmi/h", NAUTICAL_MILE_M / 3600.0), ("nmi/s", NAUTICAL_MILE_M),
     ("fpm ft/min", FOOT_M / 60.0), ("ft/s fps", FOOT_M),
 )  # fmt: skip
-ANGLE_DEG = _named(
+ANGLE_DEG = _factors_by_name(
     ("deg degree degrees", 1.0), ("rad radian radians", 180.0 / math.pi), ("1e-7deg dege7", 1e-7)
 )
-TIME_S = _named(
+TIME_S = _factors_by_name(
     ("s sec second seconds", 1.0), ("ms millisecond milliseconds", 1e-3), ("us µs", 1e-6),
     ("ns", 1e-9), ("min", 60.0), ("h hr", 3600.0),
 )  # fmt: skip
@@ -180,7 +180,7 @@ def read_lines(
     `needed` and `holds` are for the messages of a binary and of an empty file. Text may be as
     `text_of` says; lines may end in LF, CR LF or CR.
     """
-    lines = each_line(text_of(read_content(path, problems), problems, needed))
+    lines = iterate_lines(text_of(read_content(path, problems), problems, needed))
     rows = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
     if not rows:
         problems.fail(f"the file is empty: {holds} are needed")
@@ -224,7 +224,7 @@ def text_of(data: bytes, problems: Problems, needed: str = _TRAFFIC) -> str:
 _LINE = re.compile(r"[^\r\n]+|\r\n|\r|\n")
 
 
-def each_line(text: str) -> Iterator[tuple[int, str]]:
+def iterate_lines(text: str) -> Iterator[tuple[int, str]]:
     """Yield the lines that are not blank, numbered from 1, as they are wanted."""
     number = 1
     for match in _LINE.finditer(text):
@@ -290,7 +290,7 @@ def cells(line: str, count: int, name_column: int) -> list[str] | int:
 _FRAME, _HEAD = re.compile(r"[+|]?-[-+]+-[+|]?"), 30
 
 
-def without_frame(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+def strip_frame(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
     """Yield the rows of a table framed by a shell (Impala, Trino), its header once."""
     head = list(islice(lines, _HEAD))
     names = ""

@@ -21,7 +21,7 @@ from dsa_des.block.component import Component, Input, Output, Producer
 from dsa_des.block.ladder import Verified
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import Tries, has_two_bits
+from dsa_des.record.failure_counts import Tries, has_two_bits
 
 #: What the sensor that gives the angles also says, and all numbers of a fused row.
 _ANGLES = (
@@ -111,11 +111,11 @@ class Fusion(Component):
             for one in self.context.producers
         }
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return the runs in which it never fused detections of two sensors."""
         if not self.puts_together:
             return {}
-        return self._tries.undone(
+        return self._tries.failure_counts(
             "two sensors or more detect, and it never puts two of them together", of_two=True
         )
 
@@ -123,9 +123,11 @@ class Fusion(Component):
         """Return how old a detection may be to be fused with a new one, s."""
         raise TypeError(f"{type(self).__name__} states no window")
 
-    def with_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
+    def merge_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
         """Return new and recent rows of every sensor, and keep what the next run may need."""
-        together, self._recent = self._recent.with_new(arrivals, wake.first_run, self.keep_ticks)
+        together, self._recent = self._recent.add_arrivals(
+            arrivals, wake.first_run, self.keep_ticks
+        )
         return together
 
     def combine(
@@ -147,7 +149,7 @@ class Fusion(Component):
         target : (fused,) of int
             Of whom each is, an index in the roster; -1 for a false alarm.
         arrivals : dict of Arrivals
-            What came, by sensor; with what came before, as `with_recent` gives it.
+            What came, by sensor; with what came before, as `merge_recent` gives it.
         entries : dict of (fused,) of int
             By sensor, which entry of its message belongs to each fused detection; -1 for none.
         """
@@ -170,7 +172,7 @@ class Fusion(Component):
         """Return what a tracker takes of fused rows: what is new, and of one instant."""
         made = np.concatenate([one.message.measured_ticks() for one in arrivals.values()])
         targets = np.concatenate([one.message.target for one in arrivals.values()])
-        used = self._recent.were_used(arrivals)
+        used = self._recent.find_used(arrivals)
         row = fused.row_of_entries
         whole, at, alone = split_used_rows(row, parts, made, used)
         used[parts[parts >= 0]] = True

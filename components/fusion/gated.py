@@ -181,7 +181,7 @@ class Gated(Fusion):
         if not reported:
             return None
         since = {name: int(new.tick.min()) for name, new in reported.items()}
-        arrivals = self.with_recent(reported, wake)
+        arrivals = self.merge_recent(reported, wake)
         best_first = [self.sensors[index] for index in reversed(self.by_angles)]
         order = [name for name in best_first if name in arrivals]
         seen = {name: Entries.from_arrivals(arrivals[name]) for name in order}

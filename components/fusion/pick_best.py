@@ -43,7 +43,7 @@ class PickBest(Fusion):
     Parameters = PickBestParameters
     ladders = (FUSION_LADDER,)
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Return a sentence on how detections are combined here."""
         return [
             "association by truth: detections of the same target are put together, whatever was "
@@ -82,7 +82,7 @@ class PickBest(Fusion):
         row = union // width
         target = union - row * width
         if self.gate_ticks:
-            arrivals = self.with_recent(arrivals, wake)
+            arrivals = self.merge_recent(arrivals, wake)
             entries = {
                 name: latest_in_gate(new, wake.instants.take(row), target, self.gate_ticks)
                 for name, new in arrivals.items()

@@ -23,7 +23,7 @@ class Recent:
     used: Mapping[str, BoolArray] = field(default_factory=dict)
     kept: Mapping[str, slice | IntArray] = field(default_factory=dict)
 
-    def with_new(
+    def add_arrivals(
         self, arrivals: Mapping[str, Arrivals], first_run: int, keep_ticks: int
     ) -> tuple[dict[str, Arrivals], Self]:
         """Return new and recent rows of every sensor, by name, and what is recent then.
@@ -47,8 +47,8 @@ class Recent:
             seen[name], _ = _rows(all_seen, used[name], young)
         return together, type(self)(seen, used, kept)
 
-    def were_used(self, arrivals: Mapping[str, Arrivals]) -> BoolArray:
-        """Return which entries were used before, of what `with_new` gave, one after the other.
+    def find_used(self, arrivals: Mapping[str, Arrivals]) -> BoolArray:
+        """Return which entries were used before, of what `add_arrivals` gave, one after the other.
 
         Of anything else none is known to be.
         """

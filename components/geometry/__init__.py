@@ -70,7 +70,7 @@ from components.geometry.ellipsoid import (
     slant_range_m,
     spherical_from_enu,
 )
-from components.geometry.field_of_view import FieldOfView, rising_sector, sector_width_rad
+from components.geometry.field_of_view import FieldOfView, sector_width_rad, unwrap_sector
 from components.geometry.meridians import (
     NEAR_A_POLE_DEG,
     level_parts,

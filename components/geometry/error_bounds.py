@@ -189,7 +189,7 @@ def geodesic_error(envelope: Envelope) -> Interval | None:
     level = thick * (k_max - k_min) / math.sqrt(2.0) * s
     level += k_max**2 * s**3 / 6.0 * (1.0 + thick * k_max)
     rise = min(_largest_rise(envelope), range_m + drop)
-    rest = _from_offsets(level, drop, rise, range_m, least * range_m - math.hypot(level, drop))
+    rest = _bound_by_offsets(level, drop, rise, range_m, least * range_m - math.hypot(level, drop))
     if rest is None:
         return None
     angle, relative = rest
@@ -198,7 +198,7 @@ def geodesic_error(envelope: Envelope) -> Interval | None:
     return angle + _largest_turn(least, most), stretch * off / least + relative
 
 
-def _from_offsets(
+def _bound_by_offsets(
     level_m: float, drop_m: float, rise_m: float, range_m: float, shortest_m: float
 ) -> Interval | None:
     """Return angle and relative error of range from errors of the level and vertical offsets.

@@ -57,7 +57,7 @@ class FieldOfView:
         return result
 
 
-def rising_sector(low_rad: float, high_rad: float) -> tuple[float, float]:
+def unwrap_sector(low_rad: float, high_rad: float) -> tuple[float, float]:
     """Return a sector's bounds, the upper one a turn higher if it was below the lower one."""
     return low_rad, high_rad + TWO_PI if high_rad < low_rad else high_rad
 
@@ -70,7 +70,7 @@ def sector_width_rad(low_rad: float, high_rad: float) -> float:
 def _azimuth_bounds(azimuth_min_rad: float, azimuth_max_rad: float) -> tuple[float, float]:
     _require("azimuth_min_rad", azimuth_min_rad, TWO_PI, "[-2 pi, 2 pi]")
     _require("azimuth_max_rad", azimuth_max_rad, TWO_PI, "[-2 pi, 2 pi]")
-    low, high = rising_sector(float(azimuth_min_rad), float(azimuth_max_rad))
+    low, high = unwrap_sector(float(azimuth_min_rad), float(azimuth_max_rad))
     if high < low:
         raise ValueError(
             f"azimuth_min_rad is {azimuth_min_rad}: it must be at most one turn above "

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.guidance.intervals import limits_of
-from components.guidance.situation import Detector, State, meets, meets_at
+from components.guidance.situation import Detector, State, is_met_at, meets
 from components.well_clear.relative_motion import Span, nearly_equal
 from dsa_des.arrays.types import BoolArray, FloatArray
 
@@ -163,15 +163,15 @@ class AltitudeConflicts:
                 span = self._detector.span(flight, self._intruder, time_s, time_s + 1.0)
                 self._seconds.append((time_s, due & nearly_equal(span.begin_s, time_s)))
 
-    def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
+    def is_unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Return which altitude changes conflict within the horizon."""
         end_s = np.minimum(self._conflicts_after(horizon_s, self._level_s), self._lookahead_s)
         begin_s = np.maximum(from_s, self._level_s)
-        met = meets(self._level, begin_s, end_s) | meets_at(self._level, from_s, begin_s, end_s)
+        met = meets(self._level, begin_s, end_s) | is_met_at(self._level, from_s, begin_s, end_s)
         if not self._altitudes.instantaneous:
             end_s = np.minimum(self._conflicts_after(horizon_s, self._held_s), self._held_until_s)
             begin_s = np.maximum(from_s, self._held_s)
-            met |= meets(self._held, begin_s, end_s) | meets_at(self._held, from_s, begin_s, end_s)
+            met |= meets(self._held, begin_s, end_s) | is_met_at(self._held, from_s, begin_s, end_s)
         last_s = horizon_s if self._from_now else np.inf
         for time_s, inside in self._seconds:
             met |= inside & (time_s >= from_s) & (time_s <= last_s)
@@ -180,9 +180,9 @@ class AltitudeConflicts:
     def _conflicts_after(self, horizon_s: Any, phase_s: FloatArray) -> FloatArray:
         return np.asarray(horizon_s if self._from_now else horizon_s + phase_s)
 
-    conflicts_soon = unsafe
+    has_conflict_soon = is_unsafe
 
-    def conflicts_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
+    def has_conflict_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
         """Return which altitude changes conflict before a time (n, 1)."""
         horizon_s = np.minimum(horizon_s, self._lookahead_s)
         until_s = np.minimum(until_s, horizon_s)

@@ -12,7 +12,7 @@ import numpy as np
 from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.guidance.altitudes import AltitudeConflicts, Altitudes
 from components.guidance.intervals import FULL_TURN, limits_of
-from components.guidance.situation import Detector, State, meets, meets_at
+from components.guidance.situation import Detector, State, is_met_at, meets
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 
@@ -141,17 +141,17 @@ class StepConflicts:
             lasts_s = steps.time_s + steps.step_time_s
             self._while_flown = meets(self._span, steps.time_s, lasts_s) & steps.there
 
-    def conflicts_soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
+    def has_conflict_soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Return which steps lead to a conflict after the manoeuvre."""
         time_s = self._steps.time_s
         begin_s = np.maximum(from_s, time_s)
         end_s = np.minimum(self._lookahead_s, horizon_s + self._after_s)
-        met = meets(self._span, begin_s, end_s) | meets_at(self._span, from_s, begin_s, end_s)
+        met = meets(self._span, begin_s, end_s) | is_met_at(self._span, from_s, begin_s, end_s)
         return np.asarray(met & self._steps.there & np.asarray(from_s <= horizon_s))
 
-    def unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
+    def is_unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Return which steps conflict, or lie beyond one that does while it is flown."""
-        met = self.conflicts_soon(from_s, horizon_s)
+        met = self.has_conflict_soon(from_s, horizon_s)
         if self._steps.instantaneous:
             return met
         first = np.ceil(from_s / self._steps.step_time_s)
@@ -163,7 +163,7 @@ class StepConflicts:
         due = due & (self._steps.time_s < self._lookahead_s) & np.asarray(from_s <= horizon_s)
         return met | self._conflicts_beyond(self._while_flown & due)
 
-    def conflicts_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
+    def has_conflict_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
         """Return which steps conflict before a time (n, 1), flown until then."""
         horizon_s = np.minimum(horizon_s, self._lookahead_s)
         until_s = np.minimum(until_s, horizon_s)

@@ -77,7 +77,7 @@ class BandMemory:
             self._queues = [
                 (self._first(a), self._first(b)) for a, b in zip(left, right, strict=True)
             ]
-        self._meet(places, left, right)
+        self._split_at_common_places(places, left, right)
         result: list[int] = []
         for queues, a, b in zip(self._queues, left, right, strict=True):
             for queue, colour in zip(queues, (a, b), strict=True):
@@ -99,7 +99,9 @@ class BandMemory:
     def _first(self, colour: int) -> list[int]:
         return [colour] * self._m + [_OUTSIDE] * (self._n - self._m)
 
-    def _meet(self, places: list[float], left: list[int], right: list[int]) -> None:
+    def _split_at_common_places(
+        self, places: list[float], left: list[int], right: list[int]
+    ) -> None:
         """Split bands of line and memory at common places, so that they match one for one."""
         at = 0
         while at < max(len(places), len(self._places)):

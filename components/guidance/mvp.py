@@ -15,7 +15,7 @@ from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.wake import Wake
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 
 # Within this of its goal an aircraft stays; it flies to it no faster than in a second.
 _AT_GOAL_M, _LAST_S = 0.5, 1.0
@@ -43,9 +43,9 @@ class PotentialParameters(Parameters):
         "of where it is first seen, m; by default it flies on for ever.",
     )  # fmt: skip
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence where the own speed is above the largest, at which it is flown."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.speed_mps <= self.most_mps:
             return said
         slower = f"most_mps is {self.most_mps:g}: it never flies its own way any faster"
@@ -89,7 +89,7 @@ class VoltagePotential(Component):
         #: How many entries are of no target, of how many; and how often its own velocity lacked.
         self._strange, self._unmoved = NO_COUNTS, NO_COUNTS
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return whom it did not steer for, and how often it could not at all."""
         return {
             "a track is near no target and is not steered for": self._strange,
@@ -103,9 +103,9 @@ class VoltagePotential(Component):
             return None
         others, own_mps, heard = _dense(alerts)
         of = wake.run[alerts.row_of_entries]
-        self._strange = with_cases(self._strange, of[alerts.target < 0], of)
+        self._strange = count_cases(self._strange, of[alerts.target < 0], of)
         some, still = heard.any(axis=1), np.isnan(own_mps[0])
-        self._unmoved = with_cases(self._unmoved, wake.run[some & still], wake.run[some])
+        self._unmoved = count_cases(self._unmoved, wake.run[some & still], wake.run[some])
         place = np.array([states.own_lat_deg, states.own_lon_deg, states.own_alt_m])
         commanded = np.full((2, len(wake)), math.nan)
         for turn in turns(wake.run):

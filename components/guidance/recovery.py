@@ -166,7 +166,7 @@ class _Search:
         """Return which values keep clear of the cylinder alone."""
         clear = self._kind.there.copy()
         for one, cylinder in zip(self._concerned, self._cylinders, strict=True):
-            unsafe = cylinder.unsafe(0.0, one.horizon_s)
+            unsafe = cylinder.is_unsafe(0.0, one.horizon_s)
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return clear
 
@@ -178,11 +178,11 @@ class _Search:
         clear = self._kind.there.copy()
         of_all = zip(self._concerned, self._volumes, self._cylinders, strict=True)
         for one, volume, cylinder in of_all:
-            unsafe = volume.unsafe(time_s, one.horizon_s)
-            unsafe |= cylinder.conflicts_before(time_s, one.horizon_s)
+            unsafe = volume.is_unsafe(time_s, one.horizon_s)
+            unsafe |= cylinder.has_conflict_before(time_s, one.horizon_s)
             beyond = time_s > one.horizon_s
             if beyond.any():
-                unsafe |= cylinder.unsafe(0.0, one.horizon_s) & beyond
+                unsafe |= cylinder.is_unsafe(0.0, one.horizon_s) & beyond
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return clear
 

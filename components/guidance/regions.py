@@ -96,7 +96,7 @@ class Regions:
         known, concerned = self.concerned_intruders(region)
         clear = self._kind.there.copy()
         for one in concerned:
-            unsafe = self.conflicts(one.intruder, one.level).unsafe(0.0, one.horizon_s)
+            unsafe = self.conflicts(one.intruder, one.level).is_unsafe(0.0, one.horizon_s)
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return known, clear
 
@@ -141,7 +141,7 @@ class Regions:
             ahead = (begin_s == 0.0) | is_surely_less(begin_s, due_s)
             soon_s = min(level.alerting_time_s, self._lookahead_s)
             horizon_s = np.where(ahead, self._lookahead_s, soon_s)[:, np.newaxis]
-            met = self.conflicts(index, level).conflicts_soon(0.0, horizon_s).any(axis=1)
+            met = self.conflicts(index, level).has_conflict_soon(0.0, horizon_s).any(axis=1)
             of_whom = there & (ahead | met)
             if of_whom.any():
                 result.append(Concerned(index, level, of_whom, horizon_s))

@@ -59,7 +59,7 @@ def meets(span: Span, begin_s: Any, end_s: Any) -> BoolArray:
     return np.asarray(result & (np.asarray(begin_s) < end_s))
 
 
-def meets_at(span: Span, from_s: Any, begin_s: Any, end_s: Any) -> BoolArray:
+def is_met_at(span: Span, from_s: Any, begin_s: Any, end_s: Any) -> BoolArray:
     """Return whether a volume is violated at an instant, if `from_s` leaves no more time."""
     alone = np.asarray((begin_s == end_s) & (from_s == end_s))
     if not alone.any():

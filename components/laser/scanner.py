@@ -111,9 +111,9 @@ class LaserParameters(RangeErrorParameters, SensorParameters):
             )
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence if a scan's single shot cannot give the hits that are needed."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.pattern == "one_shot" and self.hits_needed > 1:
             said.append("hits_needed is more than the one shot of a scan: nothing is detected")
         return said

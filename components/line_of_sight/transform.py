@@ -200,7 +200,7 @@ class Transform(Component):
         earth = REFERENCE[0] if self.rung is None else self.rung.earth
         return seeming_look(self.context, earth, look)
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Return a sentence for each geometry model that was picked, with the reason."""
         return [] if self.rung is None else list(self.rung.sentences)
 

@@ -32,7 +32,7 @@ class CueCones(PositionAndVelocity, FrameOrigin, Message):
     until_s: FloatArray = column("s", "", "the last instant at which it counts")
 
     @classmethod
-    def initial(cls, values: Mapping[str, object]) -> Self:
+    def make_initial(cls, values: Mapping[str, object]) -> Self:
         """Return a message without cones; the scene's table must be empty."""
         if values:
             raise ValueError("cues before the first message can only be an empty table, {}")

@@ -55,7 +55,7 @@ _SKIPPED = {
 }
 #: Index into the roster of a detection without a target; it is recorded as null.
 FALSE_TARGET = -1
-#: Extras that are instants, which a sensor stamps anew (`Detections.frozen`).
+#: Extras that are instants, which a sensor stamps anew (`Detections.repeat_rows`).
 _INSTANTS = ("illuminated_s", "reported_s", "velocity_s")
 #: Columns of ``detections`` that only some sensors fill. For others, a subclass has a field
 #: ``extras: dict[str, AnyArray] = columns({**EXTRAS, "name": Column("m", "", "meaning")}, ...)``.
@@ -234,7 +234,7 @@ def sensor_offers(producers: Iterable[Any]) -> dict[str, Any]:
     return offers
 
 
-def without_range(producers: Iterable[Any]) -> str:
+def describe_rangeless(producers: Iterable[Any]) -> str:
     """Return who leads to some blocks, where no sensor among them measures range; else nothing."""
     offers = sensor_offers(producers)
     if not offers or any(
@@ -337,9 +337,9 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
             tables["detections"].update(own or {})
         return tables if self.looks is None else {**tables, "looks": look_columns(self)}
 
-    def frozen(self, of: Self, source: IntArray, later_s: FloatArray) -> Self:
+    def repeat_rows(self, of: Self, source: IntArray, later_s: FloatArray) -> Self:
         """Return its scans with detections of former ones: of nothing that is there now."""
-        result = super().frozen(of, source, later_s)
+        result = super().repeat_rows(of, source, later_s)
         row = result.row_of_entries
         old = (later_s > 0.0)[row]
         result.target = np.where(old, FALSE_TARGET, result.target)
@@ -411,7 +411,7 @@ class OwnOfEntries(Message):
     }
 
 
-class Reporting(Protocol):
+class ReportTransform(Protocol):
     """Adds to what a sensor reports, or changes it."""
 
     def __call__(
@@ -420,4 +420,4 @@ class Reporting(Protocol):
         """Return what is sent; `rows` is the row of `targets` at each scan."""
 
 
-REPORT = Hook("report", Reporting, "detections: what is sent")
+REPORT = Hook("report", ReportTransform, "detections: what is sent")

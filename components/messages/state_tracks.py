@@ -133,7 +133,7 @@ class StateTracks(PositionAndVelocity, FrameOrigin, Message):
     )
 
     @classmethod
-    def initial(cls, values: Mapping[str, object]) -> Self:
+    def make_initial(cls, values: Mapping[str, object]) -> Self:
         """Return a message without tracks; the scene's table must be empty."""
         if values:
             raise ValueError("tracks before the first message can only be an empty table, {}")

@@ -148,7 +148,7 @@ class Manoeuvres(Message):
         return cls.of(some.tick.tolist(), [manoeuvres[row] for row in rows]).of_runs(some.run)
 
     @classmethod
-    def initial(cls, values: Mapping[str, object]) -> Self:
+    def make_initial(cls, values: Mapping[str, object]) -> Self:
         """Refuse: before the first manoeuvre there is none, ``holds = "nothing"``."""
         raise ValueError("no manoeuvre can be written in a scene; allowed: 'nothing'")
 

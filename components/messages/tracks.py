@@ -55,7 +55,7 @@ class Tracks(MeasuredLine, Message):
             self.updated = self.age_s <= 0.0
 
     @classmethod
-    def initial(cls, values: Mapping[str, object]) -> Self:
+    def make_initial(cls, values: Mapping[str, object]) -> Self:
         """Return a message without tracks; the scene's table must be empty."""
         if values:
             raise ValueError("tracks before the first message can only be an empty table, {}")

@@ -20,10 +20,10 @@ from components.metrics.rows import (
     is_of_target,
     scan_time_s,
     sensors_of,
+    share_columns,
     start_or_never,
     values_of_target,
     values_of_targets,
-    with_trials,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.replicas.times_out import blocks_that_may_be_out, times_out
@@ -181,7 +181,7 @@ class DetectionShare(TargetMetric):
             )
             rows = detections
             successes = np.bincount(rows["replica"][hits], minlength=len(group))
-            values |= with_trials(f"detection_share.{name}", successes, trials)
+            values |= share_columns(f"detection_share.{name}", successes, trials)
         for name, spans in times_out(group.scene, group.replicas, group.duration_s).items():
             if name in self.names:
                 out_s = np.array([(each[:, 1] - each[:, 0]).sum() for each in spans])
@@ -262,7 +262,7 @@ class Declaration(TargetMetric):
             values[f"declaration_cut_off.{name}"] = cut
         return values
 
-    def expected(self, scene: Scene) -> Mapping[str, float]:
+    def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
         """Return scan period × (m - 1): the delay where every scan detects."""
         values: dict[str, float] = {}
         for name in self.sensors:

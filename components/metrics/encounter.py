@@ -14,7 +14,7 @@ from pydantic import Field
 
 from components.arguments.units import FOOT_M
 from components.metrics.detection import ANY, DECLARED, DeclarationParameters, declarations
-from components.metrics.flown_flights import FlownMetric, each_alone
+from components.metrics.flown_flights import FlownMetric, read_runs_singly
 from components.metrics.losses import closest, losses_s
 from components.metrics.rows import (
     END,
@@ -118,7 +118,7 @@ class _Encounter(FlownMetric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        self.sensors = self.on_platform(sensors_of(scene, parameters.sensors))
+        self.sensors = self.select_on_platform(sensors_of(scene, parameters.sensors))
         #: Sensors, and any of them, where there is one.
         self.reports = [*self.sensors, ANY] if self.sensors else []
 
@@ -151,7 +151,7 @@ class ClosestApproach(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        names, each = self.of_each_flight(group, each_alone(_closest), to_the_end=True)
+        names, each = self.read_each_flight(group, read_runs_singly(_closest), to_the_end=True)
         nearest = earliest(each[0], each[0])
         distance, time_s = values_of_target(each[0], nearest), values_of_target(each[1], nearest)
         code = np.where(nearest < 0, 0.0, values_of_target(each[2], nearest))
@@ -213,7 +213,7 @@ class WellClear(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        names, each = self.of_each_flight(group, self.p.losses_s, to_the_end=True)
+        names, each = self.read_each_flight(group, self.p.losses_s, to_the_end=True)
         lost_s, collision_s, begun_s = each
         lost_at_start = is_in_scan(lost_s, begun_s)
         values: dict[str, AnyArray] = {
@@ -313,7 +313,7 @@ class AlertTimes(FlownMetric):
         traffic = traffic_block(scene).name
         #: Whether losses are of what was flown, so that a run that ended early has no later ones.
         self._as_flown = parameters.steered or all(w.target != traffic for w in scene.wires)
-        self._blocks = self.on_platform(recorded_by(scene, "alerts"))
+        self._blocks = self.select_on_platform(recorded_by(scene, "alerts"))
         #: Which blocks may be out behind each of them that has any.
         self._behind = {name: of for name in self._blocks if (of := _blocks_before(scene, name))}
 
@@ -346,7 +346,7 @@ class AlertTimes(FlownMetric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        names, (lost_s, nmac_s, _) = self.of_each_flight(
+        names, (lost_s, nmac_s, _) = self.read_each_flight(
             group, self.p.losses_s, to_the_end=self._as_flown
         )
         columns = group.tables["alerts"]

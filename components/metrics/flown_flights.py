@@ -135,7 +135,7 @@ class FlownMetric(TargetMetric):
                 flights[at].name = name
         return flights
 
-    def on_platform(self, blocks: Sequence[str]) -> list[str]:
+    def select_on_platform(self, blocks: Sequence[str]) -> list[str]:
         """Return those of some blocks that are on the platform that looks."""
         return [block for block in blocks if self._on.get(block, -1) == self.viewer]
 
@@ -173,7 +173,7 @@ class FlownMetric(TargetMetric):
             result[number] = told._replace(told_s=np.maximum.accumulate(told.told_s))
         return result
 
-    def of_flights(
+    def read_flights(
         self,
         group: Group,
         read: "Read",
@@ -207,7 +207,7 @@ class FlownMetric(TargetMetric):
         radius_m, half_m = self.cylinders_m()[event]
         if score == "separation":
             limits_m = [(level * radius_m, level * half_m) for level in levels]
-            return self.of_flights(group, partial(first_within_s, limits_m), to_the_end=True)
+            return self.read_flights(group, partial(first_within_s, limits_m), to_the_end=True)
         told = self._received_manoeuvres(group)
         result = np.full((len(levels), len(group)), np.inf)
         counts = np.zeros(len(group), dtype=np.int64)
@@ -228,7 +228,7 @@ class FlownMetric(TargetMetric):
                 result[number, some] = np.minimum(result[number, some], better)
         return np.where(np.isinf(result), np.nan, result)
 
-    def of_each_flight(
+    def read_each_flight(
         self, group: Group, read: "Read", *, to_the_end: bool = False
     ) -> tuple[list[str], FloatArray]:
         """Return names of targets, and what `read` makes of each by itself.
@@ -248,7 +248,7 @@ class FlownMetric(TargetMetric):
     def ranges_m(self, group: Group, time_s: FloatArray, *, to_the_end: bool) -> FloatArray:
         """Return the slant range of each target, at a time (replicas, targets) of its own, m.
 
-        Targets are those of `of_each_flight`; NaN where there is no time, or one is not there.
+        Targets are those of `read_each_flight`; NaN where there is no time, or one is not there.
         """
         runs, run_of = self._flights(group, True, to_the_end)
         names = _names(runs)
@@ -278,7 +278,7 @@ class FlownMetric(TargetMetric):
 Read = Callable[[Sequence[list[RelativeFlight]]], FloatArray]
 
 
-def each_alone(read: Callable[[list[RelativeFlight]], tuple[float, ...]]) -> Read:
+def read_runs_singly(read: Callable[[list[RelativeFlight]], tuple[float, ...]]) -> Read:
     """Return what reads the flights of one run after the other."""
     return lambda runs: np.array([read(flights) for flights in runs]).T
 
@@ -382,7 +382,7 @@ class PlatformTracks(Metric):
 
     def blocks_on_board(self, blocks: Sequence[str]) -> list[str]:
         """Return those of some blocks that are on the platform."""
-        return [*blocks] if self._flown is None else self._flown.on_platform(blocks)
+        return [*blocks] if self._flown is None else self._flown.select_on_platform(blocks)
 
     def flights(self, group: Group, number: int) -> list[Any]:
         """Return the flights of the platform in a replica, and of all that it may see."""

@@ -23,7 +23,7 @@ from components.metrics.rows import (
     is_of_target,
     select_rows,
     sensors_of,
-    with_trials,
+    share_columns,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import ends_its_run
@@ -85,10 +85,10 @@ class FusedShare(TargetMetric):
             used = _latest(own, pair, self.delay_s[a])
             trials = np.bincount(own["replica"], minlength=len(group))
             successes = np.bincount(own["replica"][used], minlength=len(group))
-            values |= with_trials(_name(a, b), successes, trials)
+            values |= share_columns(_name(a, b), successes, trials)
         return values
 
-    def expected(self, scene: Scene) -> Mapping[str, float]:
+    def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
         """Return the share of two periodic clocks, if every scan detects.
 
         Exact clocks are counted in rational numbers, in the long run; of clocks that jitter or

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from components.arguments.units import FOOT_M
 from components.metrics.encounter import STEP, SizeParameters, size
-from components.metrics.flown_flights import FlownMetric, each_alone
+from components.metrics.flown_flights import FlownMetric, read_runs_singly
 from components.metrics.losses import nearest_in_runs
 from components.metrics.rows import TargetParameters
 from components.metrics.separation import RelativeFlight, relative_states, traffic_block
@@ -99,7 +99,9 @@ class Mitigated(FlownMetric):
         self, group: Group, *, steered: bool, some: IntArray | None = None
     ) -> dict[str, AnyArray]:
         """Return both events of the flights of some replicas, or all, nominal or as steered."""
-        lost_s, collision_s, _ = self.of_flights(group, self.p.losses_s, steered=steered, some=some)
+        lost_s, collision_s, _ = self.read_flights(
+            group, self.p.losses_s, steered=steered, some=some
+        )
         return {
             name: (~np.isnan(time_s)).astype(float)
             for name, time_s in zip(_EVENTS, (lost_s, collision_s), strict=True)
@@ -151,8 +153,8 @@ class LeastSeparation(FlownMetric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return all of it for every replica."""
-        range_m, time_s = self.of_flights(group, nearest_in_runs, to_the_end=True)
-        losses = self.of_flights(group, self.p.losses_s, to_the_end=True)[:2]
+        range_m, time_s = self.read_flights(group, nearest_in_runs, to_the_end=True)
+        losses = self.read_flights(group, self.p.losses_s, to_the_end=True)[:2]
         return {
             "least_separation_m": range_m,
             "least_separation_time_s": time_s,
@@ -204,7 +206,7 @@ class Severity(FlownMetric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return both for every replica; NaN where no target is ever there with the ownship."""
-        values = self.of_flights(group, each_alone(self._severities), to_the_end=True)
+        values = self.read_flights(group, read_runs_singly(self._severities), to_the_end=True)
         return {"slowc_percent": values[0], "pnmac": values[1]}
 
     def _severities(self, flights: list[RelativeFlight]) -> tuple[float, ...]:

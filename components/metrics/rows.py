@@ -177,7 +177,7 @@ def column_at_rows(columns: Columns, name: str, rows: IntArray) -> FloatArray:
     return result
 
 
-def with_trials(name: str, successes: AnyArray, trials: AnyArray) -> dict[str, FloatArray]:
+def share_columns(name: str, successes: AnyArray, trials: AnyArray) -> dict[str, FloatArray]:
     """Return a share and its trials; NaN where there was no trial."""
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(trials > 0, successes / trials, np.nan)

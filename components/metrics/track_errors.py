@@ -98,11 +98,11 @@ class ErrorsByRange(PlatformTracks):
             mine = rows[starts[number] : starts[number + 1]]
             end_s = float(group.duration_s[number])
             coverage = self.coverage(scene, self.flights(group, number))
-            for name, value in self._of_run(columns, mine, coverage, end_s).items():
+            for name, value in self._run_errors(columns, mine, coverage, end_s).items():
                 values[name][number] = value
         return values
 
-    def _of_run(
+    def _run_errors(
         self, columns: Any, rows: IntArray, coverage: Coverage, end_s: float
     ) -> dict[str, float]:
         own, targets = coverage.aircraft

@@ -116,7 +116,7 @@ class AgeOfInformation(TargetMetric):
             "age_of_information_p95_s": _ramp_quantiles(lines.of_gap, low, high, span, 0.95),
         }
 
-    def expected(self, scene: Scene) -> Mapping[str, float]:
+    def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
         """Return both for a single sensor that detects in every scan that is not lost."""
         feed = only_feed(scene, self.fusion)
         if feed is None:
@@ -226,7 +226,7 @@ class TrackUpdates(TargetMetric):
             "track_breaks": np.where(has, breaks, np.nan),
         }
 
-    def expected(self, scene: Scene) -> Mapping[str, float]:
+    def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
         """Return the mean interval for a single sensor that detects in every scan not lost."""
         fusion = recorded_by(scene, FUSED)
         feed = only_feed(scene, fusion[0]) if len(fusion) == 1 else None

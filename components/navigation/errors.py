@@ -35,7 +35,7 @@ from components.geometry import (
     unit_vector,
     wrap_two_pi,
 )
-from components.messages.detections import REPORT, Detections, LastingPart, Reporting
+from components.messages.detections import REPORT, Detections, LastingPart, ReportTransform
 from components.messages.targets import RelativeTargets, TrafficStates
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Context
@@ -241,12 +241,12 @@ class NavigationErrors(_Navigation[Believing]):
         return believed
 
 
-class NavigationReport(_Navigation[Reporting]):
+class NavigationReport(_Navigation[ReportTransform]):
     """The line of sight of every detection in the horizon's axes, as the ownship believes them."""
 
     acts_on = REPORT
 
-    def build(self, block: Any) -> Reporting:
+    def build(self, block: Any) -> ReportTransform:
         """Return what adds the columns to a report, and to its variances what navigation knows."""
         none = (0.0, 0.0, 0.0)
         noise = navigation_noise(block.context) if block.turned_by_belief else (none, none)

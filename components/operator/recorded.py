@@ -22,7 +22,7 @@ _NAMES = ("time_s", "decision", "target", "turn_rad", "climb_m", "wall_time_s")
 _MOST_PROBLEMS = 5
 
 
-def _nothing(value: Any) -> Any:
+def _zero_if_empty(value: Any) -> Any:
     """Return 0 for an empty cell."""
     return 0.0 if value is None or value == "" else value
 
@@ -42,10 +42,10 @@ class _DecisionRow(BaseModel):
     decision: Literal["shown", "looked", "verified", "rejected", "turn", "climb"]
     target: Annotated[str, BeforeValidator(_blank_to_none)] = ""
     turn_rad: Annotated[
-        float, BeforeValidator(_nothing), Field(ge=-MOST_TURN_RAD, le=MOST_TURN_RAD)
+        float, BeforeValidator(_zero_if_empty), Field(ge=-MOST_TURN_RAD, le=MOST_TURN_RAD)
     ] = 0.0
     climb_m: Annotated[
-        float, BeforeValidator(_nothing), Field(ge=-MOST_CLIMB_M, le=MOST_CLIMB_M)
+        float, BeforeValidator(_zero_if_empty), Field(ge=-MOST_CLIMB_M, le=MOST_CLIMB_M)
     ] = 0.0
     wall_time_s: Annotated[float, BeforeValidator(_unknown)] = math.nan
 
@@ -67,7 +67,7 @@ def read_decisions(path: Path) -> list[tuple[float, OperatorDecision]]:
     if path.is_dir():
         path = path / "decisions.parquet"
     try:
-        rows = _of_parquet(path) if path.suffix == ".parquet" else _of_csv(path)
+        rows = _read_parquet_rows(path) if path.suffix == ".parquet" else _read_csv_rows(path)
     except InputFileError as error:
         raise ValueError(f"{path}: {error}") from None
     result: list[tuple[float, OperatorDecision]] = []
@@ -90,13 +90,13 @@ def read_decisions(path: Path) -> list[tuple[float, OperatorDecision]]:
     return result
 
 
-def _of_csv(path: Path) -> Iterable[tuple[str, Mapping[str, Any]]]:
+def _read_csv_rows(path: Path) -> Iterable[tuple[str, Mapping[str, Any]]]:
     reader = csv.DictReader(io.StringIO(read_input_text(path)))
     _check_names(path, reader.fieldnames or [])
     return [(f"line {reader.line_num}", row) for row in reader]
 
 
-def _of_parquet(path: Path) -> Iterable[tuple[str, Mapping[str, Any]]]:
+def _read_parquet_rows(path: Path) -> Iterable[tuple[str, Mapping[str, Any]]]:
     content = read_input_bytes(path)
     import pyarrow as pa
     import pyarrow.parquet as pq

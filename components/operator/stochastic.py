@@ -17,7 +17,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 from dsa_des.time.clock import nanosecond_of
 
 
@@ -74,7 +74,7 @@ class StochasticParameters(ConfParameters):
     )
 
     @model_validator(mode="after")
-    def _settles(self) -> Self:
+    def _check_easing(self) -> Self:
         least_deg = LEAST_EASING_S * self.turn_rate_deg_s
         if 0.0 < self.eases_deg < least_deg:
             raise ValueError(
@@ -83,14 +83,14 @@ class StochasticParameters(ConfParameters):
             )
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence where a rate belongs to manoeuvres that are never made."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.turn_share == 0.0:
             of_turns = "turn_rate_deg_s", "track_step_deg", "eases_deg"
-            said += self.idle(*of_turns, because="turn_share is 0")
+            said += self.note_ineffective(*of_turns, because="turn_share is 0")
         if self.turn_share == 1.0:
-            said += self.idle("vertical_rate_mps", because="turn_share is 1")
+            said += self.note_ineffective("vertical_rate_mps", because="turn_share is 1")
         return said
 
 
@@ -149,7 +149,7 @@ class Stochastic(Component):
         #: How often nothing led out, of how often it was to steer, by run.
         self._stuck = NO_COUNTS
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how often it was to steer, and no change led clear, by run."""
         return {"no change leads clear and the ownship is left alone": self._stuck}
 
@@ -327,7 +327,7 @@ class Stochastic(Component):
                         )
         due = np.array(sorted(needed), dtype=np.int64)
         stuck = np.array([row not in result for row in due.tolist()], dtype=bool)
-        self._stuck = with_cases(self._stuck, alerts.run[due[stuck]], alerts.run[due])
+        self._stuck = count_cases(self._stuck, alerts.run[due[stuck]], alerts.run[due])
         return result
 
     def _turn(self, change: float, alerts: AlertLevels, row: int) -> Manoeuvre:

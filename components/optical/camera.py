@@ -120,15 +120,17 @@ class CameraParameters(GlintParameters, SensorParameters):
         "with confidence 0 and no pixels.",
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of errors, false alarms or rates that are switched off."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.noise_equivalent_contrast == 0 and self.errors != "signal":
-            said += self.idle("blur_pixels", because="there is no noise")
+            said += self.note_ineffective("blur_pixels", because="there is no noise")
         if not self.reports_noise:
-            said += self.idle("marked_false_alarms", because="no false alarms are reported")
+            said += self.note_ineffective(
+                "marked_false_alarms", because="no false alarms are reported"
+            )
         if not self.dynamic_weight:
-            said += self.idle("rate", because="dynamic_weight is 0")
+            said += self.note_ineffective("rate", because="dynamic_weight is 0")
         return said
 
     @model_validator(mode="after")
@@ -253,9 +255,9 @@ class Camera(Sensor):
         weight = self.p.dynamic_weight
         return f"{self.name} weighs the line of sight's rate (dynamic_weight is {weight:g})"
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Return sentences on the range beyond which nothing is detected, and on `auto` choices."""
-        said = [*super().left_out()]
+        said = [*super().skipped_work_notes()]
         if self.reach.range_max_m < self.stated_reach.range_max_m:
             range_km = self.reach.range_max_m / 1000.0
             said.append(

@@ -13,7 +13,7 @@ from components.atmosphere.visibility import KOSCHMIEDER
 from components.geometry import angle_between
 from components.optical.luminance import background_luminance, inherent_contrast, target_luminance
 from components.sensor.look import Cells, CellValues
-from components.terrain.rays import dip_rad
+from components.terrain.rays import horizon_dip_rad
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
@@ -140,7 +140,7 @@ class Background(Effect[CellValues]):
 
         def factor(cells: Cells) -> FloatArray:
             # From up here there is sky down to the dip of the horizon.
-            dip = dip_rad(cells.of_row("own_alt_m") - surface_m, refraction)
+            dip = horizon_dip_rad(cells.of_row("own_alt_m") - surface_m, refraction)
             sky, ground = (gain_against(cells, name) for name in ("sky", "ground"))
             return np.where(cells.elevation_rad >= -dip, sky, ground)
 

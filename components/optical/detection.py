@@ -23,7 +23,7 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.messages.detections import REPORT, Detections, Reporting
+from components.messages.detections import REPORT, Detections, ReportTransform
 from components.messages.false_detections import add_false_detections, sort_by_measurement
 from components.radar.detection.detector_output import false_alarm_count
 from dsa_des.arrays.types import FloatArray
@@ -180,10 +180,10 @@ class AddedFalseAlarms:
         if not self._reports:  # built all the same, it changes nothing
             return detections
         marked = self._block.p.marked_false_alarms
-        joined = self._with_alarms(detections, marked)
+        joined = self._add_false_alarms(detections, marked)
         return joined if marked else sort_by_measurement(joined)
 
-    def _with_alarms(self, detections: Detections, marked: bool) -> Detections:
+    def _add_false_alarms(self, detections: Detections, marked: bool) -> Detections:
         block, reach = self._block, self._block.reach
         found = block.detector
         now_ns = nanosecond_of(detections.tick, block.context.ticks_per_s)
@@ -230,7 +230,7 @@ class AddedFalseAlarms:
         )
 
 
-class FrameFalseAlarms(Effect[Reporting]):
+class FrameFalseAlarms(Effect[ReportTransform]):
     """Noise that reaches the threshold, anywhere in the picture: Binomial(places, Pfa) a frame."""
 
     name = "false alarms"

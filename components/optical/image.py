@@ -85,11 +85,11 @@ class ImageParameters(ElectroOpticalParameters):
             )
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of a texture that is switched off."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if not self.texture_contrast:
-            said += self.idle("texture_pixels", because="texture_contrast is 0")
+            said += self.note_ineffective("texture_pixels", because="texture_contrast is 0")
         return said
 
 
@@ -236,7 +236,7 @@ class ImageCamera(ElectroOptical):
         contrast: float,
         key: Any,
     ) -> dict[str, float]:
-        """Return what the two frames of a cell say."""
+        """Return the measurement from the two frames of a cell."""
         middle = np.array([now.column[cell], now.row[cell]])
         points = np.concatenate(outlines)
         extent = float(np.nanmax(np.abs(points), initial=0.0))
@@ -346,7 +346,7 @@ class ImageCamera(ElectroOptical):
 
     def _direction(self, pixel: AnyArray, attitude: Any) -> FloatArray:
         """Return the direction in NED of a place in the frame."""
-        seen = self.axes.pointing(*map(np.atleast_1d, self.pinhole.direction(*pixel)))
+        seen = self.axes.true_direction(*map(np.atleast_1d, self.pinhole.direction(*pixel)))
         return np.array(body_to_ned(*unit_vector(*seen), *attitude))[:, 0]
 
     def _pixel_of(self, direction: FloatArray, attitude: Any) -> FloatArray:
@@ -367,15 +367,15 @@ class ImageCamera(ElectroOptical):
     ) -> Any:  # fmt: skip
         """Report the spot's place in the picture, with what errors the scene adds to it."""
         column, row = (look.extras[name][detected] for name in ("column_px", "row_px"))
-        seen = self.axes.pointing(*self.pinhole.direction(column, row))
+        seen = self.axes.true_direction(*self.pinhole.direction(column, row))
         known = np.isfinite(column)
         azimuth_rad = np.where(known, seen[0], azimuth_rad)
         elevation_rad = np.where(known, seen[1], elevation_rad)
         return super()._measure(cells, detected, look, azimuth_rad, elevation_rad, range_m)
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
-        """Return what the picture says of each cell."""
-        cued = {"cued": cells.is_cued()} if self._cueing else {}
+        """Return the recorded picture columns of each cell."""
+        cued = {"cued": cells.is_cued()} if self._cue_cones else {}
         return {**look.extras, **cued}
 
 

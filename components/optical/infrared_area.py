@@ -125,7 +125,7 @@ class Plume(Effect[CellValues]):
         return Verdict(False, "plume is true, but no target's engine has one")
 
     def build(self, block: Any) -> CellValues:
-        """Return what is added to every cell's area."""
+        """Return the plume's area to add to every cell's."""
         scale = 1.0 if block.p.plume else 0.0
         shares = {engine: scale * share for engine, share in PLUME_SHARE_OF_BACK.items()}
 

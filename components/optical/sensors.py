@@ -150,12 +150,14 @@ class ElectroOpticalParameters(CameraParameters):
         default=0.2, gt=0, le=1, description="Diffuse reflectance of the ground; 0.2 is grass."
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of daylight, where no background is given."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.background == "none":
             sun = "sun_azimuth_deg", "sun_elevation_deg", "sun_exclusion_deg"
-            said += self.idle("sky", *sun, "ground_reflectance", because="background is 'none'")
+            said += self.note_ineffective(
+                "sky", *sun, "ground_reflectance", because="background is 'none'"
+            )
         return said
 
 

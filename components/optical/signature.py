@@ -229,7 +229,7 @@ class DynamicSignature(Effect[CellValues]):
         return Verdict(weight > 0, f"dynamic_weight is {weight:g}")
 
     def build(self, block: Any) -> CellValues:
-        """Return what is added to every cell's signature."""
+        """Return the term to add to every cell's signature."""
         return MovingTargets(block.p.dynamic_weight, block.p.rate, block.context.ticks_per_s)
 
 

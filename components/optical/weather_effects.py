@@ -25,9 +25,9 @@ from components.environment.tables import Weather
 from components.optical.contrast import CONTRAST, visibility_transmission
 from components.sensor.look import Cells, CellValues
 from components.sensor.weather_cells import (
+    cells_on_lines,
     cells_verdict,
     heights_within,
-    on_the_way,
     weather_cells,
 )
 from dsa_des.arrays.types import FloatArray
@@ -47,7 +47,9 @@ class Visibility(Effect[CellValues]):
         """Return whether haze reduces contrast: needs visibility, fog or rain in ``[weather]``."""
         weather = block.context.sections["weather"]
         if infrared_band_of(block) is not None:
-            return Verdict(False, f"{_describe_band(block)}: the air takes what it takes there")
+            return Verdict(
+                False, f"{_describe_extinction_band(block)}: the air takes what it takes there"
+            )
         if weather.visibility_km is not None:
             return Verdict(True, f"[weather] visibility_km is {weather.visibility_km:g}")
         found = [
@@ -82,7 +84,7 @@ class BandExtinction(Effect[CellValues]):
 
     def verdict(self, block: Any) -> Verdict:
         """Return whether air attenuates the camera's band: needs ``extinction_band``."""
-        return Verdict(infrared_band_of(block) is not None, _describe_band(block))
+        return Verdict(infrared_band_of(block) is not None, _describe_extinction_band(block))
 
     def build(self, block: Any) -> CellValues:
         """Return the factor on every cell's contrast."""
@@ -126,7 +128,7 @@ class ObscuringCells(Effect[CellValues]):
 
         def factor(cells: Cells) -> FloatArray:
             depth = np.zeros(len(cells))
-            for one, within in on_the_way(block, cells):
+            for one, within in cells_on_lines(block, cells):
                 ends_m = heights_within(cells, within)
                 low, high = np.minimum(*ends_m), np.maximum(*ends_m)
                 rain = share_between(low, high, -math.inf, weather.rain_top_m)
@@ -141,7 +143,7 @@ class ObscuringCells(Effect[CellValues]):
 
 
 def _fog_per_m(block: Any, water_g_m3: float) -> float:
-    """Return what fog takes of visible light, of an infrared band or of a laser's, 1/m."""
+    """Return the extinction by fog of visible light, an infrared band or a laser, 1/m."""
     visibility_m = float(fog_visibility_m(water_g_m3))
     if math.isinf(visibility_m):
         return 0.0
@@ -189,7 +191,7 @@ class Night(Effect[bool]):
         return True
 
 
-def _describe_band(block: Any) -> str:
+def _describe_extinction_band(block: Any) -> str:
     return f"extinction_band is {block.p.extinction_band!r}"
 
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import finite, positive
 from components.geometry import TWO_PI, wrap_pi
-from components.messages.detections import REPORT, Detections, OwnOfEntries, Reporting
+from components.messages.detections import REPORT, Detections, OwnOfEntries, ReportTransform
 from components.messages.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision, farthest_look
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.sensor.look import Cells, CellValues
@@ -295,7 +295,7 @@ class Sweep:
         return moved
 
 
-class BeamSweep(Effect[Reporting]):
+class BeamSweep(Effect[ReportTransform]):
     """A beam that sweeps once per scan lights each target at an instant of its own.
 
     Everything about a target is then that of this instant: whether it is in reach, its SNR, its

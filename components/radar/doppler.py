@@ -201,7 +201,7 @@ class RangeRates(Protocol):
     """Gives true range rates."""
 
     def __call__(self, cells: Cells, detected: IntArray, /) -> FloatArray:
-        """Return those of some cells, m/s."""
+        """Return the range rates of some cells, m/s."""
 
 
 RANGE_RATE = Hook("range rate", RangeRates, "rate of some cells' slant range, m/s")
@@ -227,7 +227,7 @@ class RangeRate(Effect[RangeRates]):
     outside_the_proof = "it fills columns that are null without it"
 
     def build(self, block: Any) -> RangeRates:
-        """Return what gives the rates of some cells."""
+        """Return a function that gives the range rates of some cells."""
         return range_rates
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry import Vector, body_to_ned, unit_vector
-from components.messages.detections import REPORT, Detections, Reporting
+from components.messages.detections import REPORT, Detections, ReportTransform
 from components.messages.false_detections import sort_by_measurement
 from components.messages.targets import RelativeTargets
 from components.radar.detection.clutter import clutter_detection_probability
@@ -67,10 +67,10 @@ class NoiseReports:
     ) -> Detections:
         """Return the report with the false alarms of its scans."""
         for which, crossing in enumerate(self._crossings):
-            detections = self._with_alarms(detections, targets, rows, crossing, which)
+            detections = self._add_false_alarms(detections, targets, rows, crossing, which)
         return sort_by_measurement(detections)
 
-    def _with_alarms(
+    def _add_false_alarms(
         self,
         detections: Detections,
         targets: RelativeTargets,
@@ -107,12 +107,12 @@ class NoiseReports:
         rate = places.uniform(key, scan, 4)
         snr = np.maximum(snr, FAINTEST)
         cued = bool(which) if len(self._crossings) > 1 else None
-        return self._block.with_noise_reports(
+        return self._block.add_noise_reports(
             detections, targets, rows, row, where, key=key, snr=snr, rate=rate, cued=cued
         )
 
 
-class FalseAlarms(Effect[Reporting]):
+class FalseAlarms(Effect[ReportTransform]):
     """False alarms by scan: Binomial(resolution cells, Pfa), anywhere in the field of view.
 
     Pfa is how often noise crosses the threshold that targets cross, where a look is cued that of
@@ -195,7 +195,7 @@ class GroundReports:
     @cached_property
     def _body(self) -> Vector:
         """Where the beams truly point in body axes; the sensor's are known once all is built."""
-        x, y, z = unit_vector(*self._block.axes.pointing(*self._beams))
+        x, y, z = unit_vector(*self._block.axes.true_direction(*self._beams))
         return x, y, z
 
     def __call__(
@@ -203,7 +203,7 @@ class GroundReports:
     ) -> Detections:
         """Return the report with the ground's false alarms of its scans."""
         numbers = zip(rows.tolist(), detections.run.tolist(), detections.scan.tolist(), strict=True)
-        crossed = [self._of_scan(targets, *number) for number in numbers]
+        crossed = [self._find_ground_crossings(targets, *number) for number in numbers]
         counts = [len(cell) for cell, _ in crossed]
         row = np.repeat(np.arange(len(crossed)), counts)
         if len(row) == 0:
@@ -224,13 +224,13 @@ class GroundReports:
         beyond = -np.log1p(-draws.uniform(key, scan, 4)) * (1.0 + cnr)
         snr = np.maximum(beyond + self._crossing.threshold - 1.0, FAINTEST)
         rate = draws.uniform(key, scan, 5)
-        joined = self._block.with_noise_reports(
+        joined = self._block.add_noise_reports(
             detections, targets, rows, row, where, key=key + _OF_GROUND, snr=snr, rate=rate
         )
         # Without any here, the report is in that order already.
         return sort_by_measurement(joined)
 
-    def _of_scan(
+    def _find_ground_crossings(
         self, targets: RelativeTargets, row: int, run: int, scan: int
     ) -> tuple[IntArray, FloatArray]:
         """Return the cells that the ground crosses the threshold in, and their CNR."""
@@ -303,7 +303,7 @@ class GroundReports:
         return pfa, clutter.total
 
 
-class ClutterAlarms(Effect[Reporting]):
+class ClutterAlarms(Effect[ReportTransform]):
     """Reports of cells in which the ground crosses the threshold that noise does not.
 
     With an adaptive threshold there are none beyond those of noise, whose number it keeps. With
@@ -340,7 +340,7 @@ HIGH_FALSE_ALARM_PROBABILITY = 0.01
 NO_FALSE_ALARMS_PER_SCAN = 1e-6
 
 
-def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
+def high_pfa_warnings(parameters: Any, snr_db: float) -> list[str]:
     """Return a warning if the Pfa is so high that echoes below the noise are detected."""
     pfa = parameters.false_alarm_probability
     if pfa < HIGH_FALSE_ALARM_PROBABILITY or not math.isfinite(snr_db):
@@ -353,7 +353,7 @@ def high_false_alarms(parameters: Any, snr_db: float) -> list[str]:
     ]
 
 
-def unlikely_false_alarms(block: Any) -> list[str]:
+def false_alarm_count_warnings(block: Any) -> list[str]:
     """Return a sentence on the number of false alarms, if that is large or practically 0."""
     if not (block.p.false_alarms and block.p.enabled):
         return []

@@ -122,7 +122,7 @@ class LinkBudget:
         return unflatten(self.snr_of_cells(distance, rcs), shape)
 
     def snr_of_cells(self, range_m: FloatArray, rcs_m2: FloatArray) -> FloatArray:
-        """Return the same for flat arrays of one shape that are known to be 0 or more.
+        """Return linear SNR for flat arrays of one shape that are known to be 0 or more.
 
         Closer than `nearest_m` the far-field equation does not hold and the receiver is still
         blind from its own pulse.
@@ -178,7 +178,7 @@ def calibrated_bandwidth(
 
 
 def with_bandwidth(budget: LinkBudget, bandwidth_hz: float) -> LinkBudget:
-    """Return the same budget with another bandwidth."""
+    """Return the link budget with another bandwidth."""
     return replace(budget, bandwidth_hz=bandwidth_hz)
 
 
@@ -222,7 +222,7 @@ _RANGES = {
 _PREFIXES = {1e3: "k", 1e6: "M", 1e9: "G", 1e-3: "m", 1e-6: "µ"}
 
 
-def implausible(parameters: Any) -> list[str]:
+def implausible_value_warnings(parameters: Any) -> list[str]:
     """Return a warning for each value of a link budget that no radar has, by its key."""
     said = []
     for key, (low, high, unit) in _RANGES.items():
@@ -230,11 +230,11 @@ def implausible(parameters: Any) -> list[str]:
         if value is None or low <= value <= high:
             continue
         text = f"{key} is {value:g} {unit}: implausible, radars have {low:g} to {high:g} {unit}"
-        said.append(text + _other_unit(value, low, high, unit))
+        said.append(text + _describe_plausible_unit(value, low, high, unit))
     return said
 
 
-def _other_unit(value: float, low: float, high: float, unit: str) -> str:
+def _describe_plausible_unit(value: float, low: float, high: float, unit: str) -> str:
     """Name a multiple of the unit in which the number would be plausible."""
     if unit == "dB":
         return ""
@@ -257,7 +257,7 @@ def gain_of_beam_db(azimuth_deg: float | None, elevation_deg: float | None) -> f
     return max(0.0, 10.0 * math.log10(GAIN_TIMES_BEAM / (azimuth_deg * elevation_deg)))
 
 
-def beam_against_gain(parameters: Any) -> list[str]:
+def beam_gain_warnings(parameters: Any) -> list[str]:
     """Return a warning where beam width and antenna gain contradict each other by over 3 dB.
 
     A gain of 30,000 over the product of the beamwidths in degrees is that of antennas as they are

@@ -9,7 +9,7 @@ import numpy as np
 from components.arguments.checks import check_not_negative, positive
 from components.geometry import NEAR_A_POLE_DEG, rotate_to_meridian
 from components.messages.columns import OWN_VELOCITY
-from components.messages.detections import REPORT, Detections, Reporting
+from components.messages.detections import REPORT, Detections, ReportTransform
 from components.messages.targets import RelativeTargets, own_velocity
 from components.radar.detection.detector_output import measured_snr
 from components.radar.link_budget import wavelength
@@ -227,7 +227,7 @@ def _is_chosen(cells: IntArray, chosen: IntArray, count: int) -> IntArray:
     return np.flatnonzero(inside[cells])
 
 
-def noise_at_targets(parameters: Any) -> list[str]:
+def noise_report_warnings(parameters: Any) -> list[str]:
     """Return a warning where noise detections are reported exactly at the target."""
     steps = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
     exact = [step for step in steps if getattr(parameters, step) == 0]
@@ -239,7 +239,7 @@ def noise_at_targets(parameters: Any) -> list[str]:
     ]
 
 
-class OwnVelocity(Effect[Reporting]):
+class OwnVelocity(Effect[ReportTransform]):
     """The ownship's velocity over ground beside every detection; navigation has no error of it.
 
     A range rate is of two aircraft: an estimate of the other one's velocity from it needs ours.
@@ -250,8 +250,8 @@ class OwnVelocity(Effect[Reporting]):
     flag = "measures_range_rate"
     outside_the_proof = "it fills columns that are null without it"
 
-    def build(self, block: Any) -> Reporting:
-        """Return what adds the velocity to a report."""
+    def build(self, block: Any) -> ReportTransform:
+        """Return a function that adds the own velocity to a report."""
         ticks_per_s = block.context.ticks_per_s
 
         def with_velocity(
@@ -263,7 +263,7 @@ class OwnVelocity(Effect[Reporting]):
             row = rows[some] if after is None else np.repeat(rows, counts)
             state = targets.picture_tick[row]
             time_s = (state if after is None else state + after) / ticks_per_s
-            velocity = _from_believed_north(
+            velocity = _rotate_to_believed_north(
                 own_velocity(targets, row, time_s), targets, row, time_s
             )
             if after is not None:
@@ -276,7 +276,7 @@ class OwnVelocity(Effect[Reporting]):
         return with_velocity
 
 
-def _from_believed_north(
+def _rotate_to_believed_north(
     velocity: FloatArray, targets: RelativeTargets, row: IntArray, time_s: FloatArray
 ) -> FloatArray:
     """Return the ownship's velocity along north and east of where it believes to be."""

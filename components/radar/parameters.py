@@ -14,7 +14,7 @@ from components.radar.link_budget import (
     LinkBudget,
     calibrated_bandwidth,
     gain_of_beam_db,
-    implausible,
+    implausible_value_warnings,
 )
 from components.radar.measurement import check_signal_errors
 from components.radar.resolution import ResolutionParameters
@@ -134,17 +134,17 @@ class RadarParameters(ResolutionParameters):
         "heavy rain to 30 in drizzle (assumption).",
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of a filter or a polarisation that is switched off."""
-        said, kind = super().without_effect(), self.moving_target_filter
+        said, kind = super().ineffective_key_notes(), self.moving_target_filter
         because = f"moving_target_filter is '{kind}'"
         if kind != "filter_bank":
-            said += self.idle("filter_pulses", because=because)
+            said += self.note_ineffective("filter_pulses", because=because)
         if kind == "none":
-            said += self.idle("clutter_lock", "improvement_limit_db", because=because)
+            said += self.note_ineffective("clutter_lock", "improvement_limit_db", because=because)
         if self.polarisation != "circular":
             because = f"polarisation is '{self.polarisation}'"
-            said += self.idle("rain_rejection_db", because=because)
+            said += self.note_ineffective("rain_rejection_db", because=because)
         return said
 
     @model_validator(mode="after")
@@ -292,11 +292,11 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
         description="Whether a sweeping beam visits cue cones as a scan begins, and then sweeps.",
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key on errors by signal, where there are no such errors."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.errors != "signal":
-            said += self.idle("angle_measurement", because=f"errors is '{self.errors}'")
+            said += self.note_ineffective("angle_measurement", because=f"errors is '{self.errors}'")
         return said
 
     @model_validator(mode="after")
@@ -385,12 +385,12 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
             )
         except ValueError as error:
             # What follows from a carrier of 24 Hz must not be blamed on the range.
-            wrong = implausible(self)
+            wrong = implausible_value_warnings(self)
             raise ValueError("; ".join([*wrong, str(error)])) from error
         return replace(budget, bandwidth_hz=bandwidth_hz)
 
 
-def moved_threshold(p: LinkBudgetParameters) -> list[str]:
+def moved_threshold_warnings(p: LinkBudgetParameters) -> list[str]:
     """Return a sentence with Pd at a calibration's range, where the threshold differs."""
     known, stated, now = p.calibrate, p.calibrated_pfa, p.false_alarm_probability
     if known is None or stated == now:

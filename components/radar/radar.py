@@ -181,7 +181,7 @@ class Radar(SweepingSensor):
         each, index = np.unique(row, return_inverse=True)
         time_s = targets.picture_tick[each] / self.context.ticks_per_s
         velocity = own_velocity(targets, each, time_s)
-        body = unit_vector(*self.axes.pointing(where["azimuth"], where["elevation"]))
+        body = unit_vector(*self.axes.true_direction(where["azimuth"], where["elevation"]))
         attitude = targets.own_attitude
         if attitude is None or not np.isfinite(velocity).all():
             return off * FASTEST_M_S

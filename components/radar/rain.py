@@ -36,7 +36,7 @@ from components.radar.ground_clutter import (
 from components.radar.pulse_trains.ambiguity import unambiguous_range_m
 from components.radar.resolution import CELL_SIZES, cell_size
 from components.sensor.look import Cells
-from components.sensor.weather_cells import cells_verdict, on_the_way, weather_cells
+from components.sensor.weather_cells import cells_on_lines, cells_verdict, weather_cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 
@@ -62,12 +62,12 @@ class RainClutter(Effect[Echo]):
         if any(one.rain_rate_mm_h for one in weather_cells(block)):
             somewhere = cells_verdict(block)
             because = because if rate else somewhere.because
-        if (rate or somewhere.simulated) and (why := no_rain_echo(block)):
+        if (rate or somewhere.simulated) and (why := explain_no_rain_echo(block)):
             return Verdict(False, why)
         return Verdict(rate > 0 or somewhere.simulated, because)
 
     def build(self, block: Any) -> Echo:
-        """Return what gives the rain's RCS, 0 without rain."""
+        """Return a function for the rain's RCS in each cell, 0 without rain."""
         p = block.p
         rain = self.verdict(block).simulated
         if rain and p.pulses_summed > 1 and p.clutter_threshold == "noise":
@@ -95,7 +95,7 @@ class RainEcho(Echo):
     def rate_mm_h(self, cells: Cells) -> FloatArray:
         """Return how strongly it rains at each target."""
         rate = np.full(len(cells), float(self.weather.rain_rate_mm_h))
-        for one, within in on_the_way(self.block, cells):
+        for one, within in cells_on_lines(self.block, cells):
             rate += np.where(within.leaves >= 1.0, one.rain_rate_mm_h, 0.0)
         return rate
 
@@ -163,7 +163,7 @@ class SidelobeClutter(Effect[Echo]):
         return Verdict(True, f"sidelobe_level_db is {level_db:g}")
 
     def build(self, block: Any) -> Echo:
-        """Return what gives the RCS in the sidelobes, 0 where there is none."""
+        """Return a function for the RCS of clutter in the sidelobes, 0 where there is none."""
         return SidelobeEcho(block) if self.verdict(block).simulated else NoEcho(block)
 
 
@@ -210,7 +210,9 @@ class SidelobeEcho(Echo):
 _FARTHEST_M = math.sqrt(2.0 * SEMI_MAJOR_AXIS_M * 9000.0)
 
 
-def other_ranges_m(range_m: FloatArray, fold_m: float, farthest_m: float) -> Iterator[FloatArray]:
+def ambiguous_ranges_m(
+    range_m: FloatArray, fold_m: float, farthest_m: float
+) -> Iterator[FloatArray]:
     """Yield the ranges whose echoes arrive with those of some ranges, without these, to a farthest.
 
     Nearest first; infinite where there is none.
@@ -240,7 +242,7 @@ class FoldedClutter(Effect[Echo]):
         if not block.p.range_folds:
             return Verdict(False, "range_folds is false")
         rain = block.context.sections["weather"].rain_rate_mm_h
-        if terrain_of(block) is None and not (rain and not no_rain_echo(block)):
+        if terrain_of(block) is None and not (rain and not explain_no_rain_echo(block)):
             return Verdict(False, "there is neither [terrain] height_m nor rain")
         every = " or ".join(f"{unambiguous_range_m(f) / 1e3:.4g}" for f in block.p.prfs_hz)
         return Verdict(True, f"range_folds is true: clutter of every {every} km beside a target's")
@@ -262,19 +264,19 @@ class FoldedEcho(Echo):
         level_db = block.p.sidelobe_level_db
         self._two_way = 0.0 if level_db is None else 10.0 ** (0.2 * level_db)
         rate = self._weather.rain_rate_mm_h
-        rains = rate > 0.0 and not no_rain_echo(block)
+        rains = rate > 0.0 and not explain_no_rain_echo(block)
         self._per_m = float(rain_reflectivity_of(block, rate)) if rains else 0.0
 
     def __call__(self, cells: Any) -> FloatArray:
-        """Return it for the PRFs that decide, m²."""
-        each = np.stack([self._of_prf(cells, prf_hz)[0] for prf_hz in self.block.p.prfs_hz])
+        """Return the folded clutter's RCS for the PRFs that decide, m²."""
+        each = np.stack([self._echo_at_prf(cells, prf_hz)[0] for prf_hz in self.block.p.prfs_hz])
         needed: int = self.block.p.prfs_needed or len(each)
         return np.asarray(np.sort(each, axis=0)[needed - 1])
 
-    def _of_prf(self, cells: Cells, prf_hz: float) -> tuple[FloatArray, FloatArray]:
-        """Return what one PRF hears, m², and at which range most of it is."""
+    def _echo_at_prf(self, cells: Cells, prf_hz: float) -> tuple[FloatArray, FloatArray]:
+        """Return the folded clutter at one PRF, m², and the range of most of it."""
         total, most, where = np.zeros(len(cells)), np.zeros(len(cells)), np.array(cells.range_m)
-        for other_m in other_ranges_m(cells.range_m, unambiguous_range_m(prf_hz), _FARTHEST_M):
+        for other_m in ambiguous_ranges_m(cells.range_m, unambiguous_range_m(prf_hz), _FARTHEST_M):
             heard = np.isfinite(other_m) & (other_m >= self._nearest_m)
             at_m = np.where(heard, other_m, 1.0)
             rcs = np.where(heard, self._rcs_m2(cells, at_m), 0.0) * (cells.range_m / at_m) ** 4
@@ -315,7 +317,7 @@ class FoldedEcho(Echo):
         self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Those of the ground, or along the beam, at the range that most of it comes from."""
-        _, at_m = self._of_prf(cells, self.block.p.prf_hz)
+        _, at_m = self._echo_at_prf(cells, self.block.p.prf_hz)
         elevation = cells.elevation_rad
         if self.terrain is not None:
             height_m = cells.of_row("own_alt_m") - self.terrain.height_m
@@ -331,7 +333,7 @@ class FoldedEcho(Echo):
         return np.asarray(rate), np.hypot(moves_m_s, platform)
 
 
-def no_rain_echo(block: Any) -> str:
+def explain_no_rain_echo(block: Any) -> str:
     """Return why rain has no echo for a radar; empty where it has one."""
     if block.wavelength_m is None:
         return "frequency_hz is not given: how strongly drops scatter follows from it"

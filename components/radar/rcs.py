@@ -149,7 +149,7 @@ class RcsFluctuation(Effect[ModelsOfCells]):
         )
 
     def build(self, block: Any) -> ModelsOfCells:
-        """Return what tells each cell's fluctuation model."""
+        """Return a function for each cell's fluctuation model."""
         return models_of(block.p.swerling)
 
 
@@ -283,7 +283,7 @@ class Fading(Protocol):
     """Gives the power of lasting echoes over their mean."""
 
     def __call__(self, cells: Cells, chosen: Any, model: int, /) -> FloatArray:
-        """Return it of some cells that have one Swerling model."""
+        """Return the fading of some cells that have one Swerling model."""
 
 
 FADING = Hook("fading", Fading, "power of lasting echoes over their mean")

@@ -43,7 +43,7 @@ class ResolutionCells:
     range_m: tuple[float, float]
 
     @classmethod
-    def filling(cls, reach: Reach, nearest_m: float, cell: tuple[float, float, float]) -> Self:
+    def from_reach(cls, reach: Reach, nearest_m: float, cell: tuple[float, float, float]) -> Self:
         """Return the grid of cells (rad, rad, m) of a reach, or refuse over 1e15 of them."""
         firsts = reach.azimuth_rad[0], reach.elevation_rad[0], nearest_m
         widths = *reach.width_rad, reach.range_max_m - nearest_m
@@ -165,7 +165,7 @@ def cells_of_radar(block: Any) -> ResolutionCells:
     # Where ranges fold there are no cells beyond.
     far_m = min(block.reach.range_max_m, p.farthest_report_m)
     reach = replace(block.reach, range_max_m=far_m)
-    return ResolutionCells.filling(reach, block.budget.nearest_m, cell_size(p))
+    return ResolutionCells.from_reach(reach, block.budget.nearest_m, cell_size(p))
 
 
 class Merging:
@@ -245,7 +245,7 @@ class SeemingRange(Protocol):
     """Gives the ranges that echoes seem to come from."""
 
     def __call__(self, range_m: FloatArray, /) -> FloatArray:
-        """Return them for true ones, m."""
+        """Return the folded ranges of true ranges, m."""
 
 
 SEEMING_RANGE = Hook("seeming range", SeemingRange, "range that an echo seems to come from, m")
@@ -274,7 +274,7 @@ class RangeFolding(Effect[SeemingRange]):
         return Verdict(True, f"range_folds is true: {p.prfs_needed or count} of {count} PRFs")
 
     def build(self, block: Any) -> SeemingRange:
-        """Return what gives the seeming ranges of true ones."""
+        """Return a function from true to folded ranges."""
         p = block.p
         if not p.range_folds:
             return lambda range_m: range_m

@@ -12,7 +12,7 @@ from components.radar.detection.ladder import PD_METHOD, ExactDetection, method_
 from components.radar.detection.probability import detection_probability, probability_of_cells
 from components.radar.detection.threshold import Crossing
 from components.radar.ground_clutter import Clutter, terrain_of
-from components.radar.measurement import noise_at_targets, signal_over_clutter
+from components.radar.measurement import noise_report_warnings, signal_over_clutter
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs import (
     FADING,
@@ -87,7 +87,7 @@ class SwerlingParameters(LinkBudgetParameters):
     )
 
     @model_validator(mode="after")
-    def _covered(self) -> Self:
+    def _check_reference_pd(self) -> Self:
         if self.reference_pd <= self.false_alarm_probability:
             raise ValueError(
                 f"reference_pd is {self.reference_pd:g}: it must be above false_alarm_probability, "
@@ -111,12 +111,14 @@ class SwerlingParameters(LinkBudgetParameters):
         self._check_cued()
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of a fluctuation that is switched off."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.swerling in (0, 5):
             fading = "fluctuation_correlation_s", "scintillation_extent_m"
-            said += self.idle(*fading, because=f"swerling is {self.swerling}: nothing fluctuates")
+            said += self.note_ineffective(
+                *fading, because=f"swerling is {self.swerling}: nothing fluctuates"
+            )
         return said
 
     def _check_cued(self) -> None:
@@ -180,9 +182,9 @@ class SwerlingRadar(LinkBudgetRadar):
         if self.p.detection == "exact":
             self._method = self.built_one(PD_METHOD) or "table"
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Return a sentence on the chosen Pd method and its reason, where the scene has `auto`."""
-        said = [*super().left_out(), *noise_at_targets(self.p)]
+        said = [*super().skipped_work_notes(), *noise_report_warnings(self.p)]
         return said if self.p.model is None else [*said, *method_reasons(self, self._method)]
 
     def warnings(self) -> list[str]:
@@ -229,12 +231,18 @@ class SwerlingRadar(LinkBudgetRadar):
         pd = np.where(echo, self._pd_of_cells(cells, snr, clutter), 0.0)
         draw = cells.draws(self._draws)
         extras = {"snr_db": snr_db, "detection_probability": pd}
-        noise = draw >= self._of_target(cells, pd, clutter) if self.p.errors == "signal" else None
+        noise = (
+            draw >= self._target_detection_probability(cells, pd, clutter)
+            if self.p.errors == "signal"
+            else None
+        )
         tail = np.clip(draw / np.maximum(pd, 1e-300), 0.0, 1.0)
         cnr = None if clutter is None else clutter.total
         return Look(draw < pd, confidence, extras, signal_over_clutter(snr, cnr), noise, tail)
 
-    def _of_target(self, cells: Cells, pd: FloatArray, clutter: Clutter | None) -> FloatArray:
+    def _target_detection_probability(
+        self, cells: Cells, pd: FloatArray, clutter: Clutter | None
+    ) -> FloatArray:
         """Return the probability that the target is detected where noise alone is not.
 
         As if noise and target were detected independently, Pd = 1 - (1 - Pfa)(1 - this).
@@ -251,7 +259,7 @@ class SwerlingRadar(LinkBudgetRadar):
         rcs = values_of(self, self.mean_rcs_m2, cells)
         keys = cells.roster.keys_of(cells.target)
         for model, chosen in self._models(cells):
-            if self._fading is not None and self._lasts(model):
+            if self._fading is not None and self._is_lasting(model):
                 rcs[chosen] = rcs[chosen] * self._fading(cells, chosen, model)
                 continue
             draws = self._rcs_draws.of_runs(cells.run[chosen], cells.instant_ns[chosen])
@@ -261,7 +269,7 @@ class SwerlingRadar(LinkBudgetRadar):
             )
         return self.echo_snr(cells, rcs)
 
-    def _lasts(self, model: int) -> bool:
+    def _is_lasting(self, model: int) -> bool:
         """Return whether a model's fluctuation lasts over a look: not where its pulses differ."""
         return model in (1, 3) or (model in (2, 4) and self.p.pulses_summed == 1)
 

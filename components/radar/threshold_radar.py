@@ -21,8 +21,8 @@ from components.radar.doppler import DopplerFilter
 from components.radar.false_alarms import (
     ClutterAlarms,
     FalseAlarms,
-    high_false_alarms,
-    unlikely_false_alarms,
+    false_alarm_count_warnings,
+    high_pfa_warnings,
 )
 from components.radar.ground_clutter import (
     Clutter,
@@ -30,12 +30,12 @@ from components.radar.ground_clutter import (
     clutter_as_signal,
     terrain_of,
 )
-from components.radar.link_budget import beam_against_gain, implausible
+from components.radar.link_budget import beam_gain_warnings, implausible_value_warnings
 from components.radar.measurement import MeasuredStrength, signal_over_clutter, signal_variances
 from components.radar.parameters import (
     LinkBudgetParameters,
     dwell_factor,
-    moved_threshold,
+    moved_threshold_warnings,
 )
 from components.radar.radar import Radar
 from components.radar.rain import FoldedClutter, RainClutter, SidelobeClutter
@@ -48,7 +48,7 @@ from components.radar.weather import (
     BlindRange,
     Eclipsing,
     Multipath,
-    gas_left_out,
+    gas_left_out_notes,
     rain_warnings,
 )
 from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
@@ -121,7 +121,7 @@ class LinkBudgetRadar(Radar):
     def setup(self) -> None:
         """Store the scene's effects on the SNR."""
         super().setup()
-        self._echo_budget = self._without_blind_range()
+        self._echo_budget = self._far_field_link_budget()
         self.mean_rcs_m2 = self.built_one(MEAN_RCS) or constant_rcs_m2
         self._beam_shape = self.built_one(BEAM_SHAPE)
         self._propagation = self.built_one(PROPAGATION)
@@ -134,7 +134,7 @@ class LinkBudgetRadar(Radar):
     def _set_threshold(self) -> None:
         """Set the threshold after the scene's effects, where it is not known before."""
 
-    def _without_blind_range(self) -> Any:
+    def _far_field_link_budget(self) -> Any:
         """Return the link budget that ends where the antenna's far field does."""
         far_field = replace(self.budget, minimum_range_m=None)
         # A minimum range inside the near field is the scene's word that there are echoes.
@@ -210,7 +210,7 @@ class LinkBudgetRadar(Radar):
         """Return the SNR in dB at which the confidence of a false alarm is 0."""
         raise TypeError(f"{type(self).__name__} does not say what its confidence is measured from")
 
-    def with_noise_reports(
+    def add_noise_reports(
         self,
         detections: Detections,
         targets: RelativeTargets,
@@ -242,7 +242,7 @@ class LinkBudgetRadar(Radar):
         extras: dict[str, AnyArray] = {"snr_db": snr_db}
         kept: Any = slice(None)
         if cones := self.built_one(CUE):
-            inside = cones.in_cones(row, azimuth, elevation)
+            inside = cones.is_in_cones(row, azimuth, elevation)
             extras["cued"] = inside
             kept = slice(None) if cued is None else np.flatnonzero(inside == cued)
         return add_false_detections(
@@ -274,9 +274,9 @@ class LinkBudgetRadar(Radar):
         )
         return float(10.0 * np.log10(snr))
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Return sentences on attenuation that the scene leaves out, and on ambiguous echoes."""
-        said = [*super().left_out(), *gas_left_out(self)]
+        said = [*super().skipped_work_notes(), *gas_left_out_notes(self)]
         if self.p.prf_hz is not None and self.p.range_km is None and not self.p.range_folds:
             range_km = self.stated_reach.range_max_m / 1000.0
             said.append(
@@ -290,15 +290,15 @@ class LinkBudgetRadar(Radar):
         snr_db = self.required_snr_db(0.5, "swerling1")
         return [
             *super().warnings(),
-            *implausible(self.p),
-            *high_false_alarms(self.p, snr_db),
+            *implausible_value_warnings(self.p),
+            *high_pfa_warnings(self.p, snr_db),
             *cue_warnings(self),
-            *moved_threshold(self.p),
-            *unlikely_false_alarms(self),
+            *moved_threshold_warnings(self.p),
+            *false_alarm_count_warnings(self),
             *clutter_as_signal(self.p, terrain_of(self)),
-            *beam_against_gain(self.p),
+            *beam_gain_warnings(self.p),
             *rain_warnings(self),
-            *gas_left_out(self),
+            *gas_left_out_notes(self),
         ]
 
     def report(self) -> dict[str, Any]:

@@ -42,7 +42,7 @@ def check_unambiguous(prf_hz: float, range_km: float) -> None:
         highest_hz = 1.0 / round_trip_s(range_km * 1000.0)
         raise ValueError(
             f"prf_hz is {prf_hz:g}: echoes are unambiguous up to {reach_m / 1000:.4g} km "
-            f"and range_km is {range_km:g}; it must be at most {_rounded_down(highest_hz)}"
+            f"and range_km is {range_km:g}; it must be at most {_format_limit(highest_hz)}"
         )
 
 
@@ -127,14 +127,16 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
             self._check_scan_rate(beams)
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of a time budget or of beams that are switched off."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.budget != "dwell":
             because = f"budget is {'not given' if self.budget is None else repr(self.budget)}"
-            said += self.idle("integration", because=because)
+            said += self.note_ineffective("integration", because=because)
         if self.azimuth_beamwidth_deg is None:
-            said += self.idle("beam_spacing", because="azimuth_beamwidth_deg is not given")
+            said += self.note_ineffective(
+                "beam_spacing", because="azimuth_beamwidth_deg is not given"
+            )
         return said
 
     @property
@@ -239,7 +241,7 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
                 f"{beams.elevation} beams of {least_s:.4g} s ({what}) take "
                 f"{least_s * beams.number:.4g} s, and a scan has "
                 f"{1.0 / float(self.scan_rate_hz):.4g} s; it must be at most "
-                f"{_rounded_down(1.0 / (least_s * beams.number))}{free}"
+                f"{_format_limit(1.0 / (least_s * beams.number))}{free}"
             )
         look = self.look_energy
         if look is not None and look.summed > MOST_PULSES_SUMMED:
@@ -277,7 +279,7 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
             )
 
 
-def _rounded_down(value: float) -> str:
+def _format_limit(value: float) -> str:
     """Write a limit with four digits so that what is written keeps it."""
     step = 10.0 ** (math.floor(math.log10(value)) - 3)
     return f"{math.floor(value / step) * step:.4g}"
@@ -319,7 +321,7 @@ class TimeBudget(Effect[LookEnergy]):
         )
 
     def build(self, block: Any) -> LookEnergy:
-        """Return what a look consists of."""
+        """Return the pulses and energy of a look."""
         look: LookEnergy = block.p.look_energy
         return look
 

@@ -16,13 +16,13 @@ from components.atmosphere.slant_path import (
 )
 from components.environment.tables import Weather
 from components.radar.ground_clutter import terrain_of
-from components.radar.rain import no_rain_echo
+from components.radar.rain import explain_no_rain_echo
 from components.radar.resolution import cell_size
 from components.sensor.look import Cells, CellValues
 from components.sensor.weather_cells import (
+    cells_on_lines,
     cells_verdict,
     heights_within,
-    on_the_way,
     weather_cells,
 )
 from components.terrain.reflection import two_ray_factor
@@ -227,7 +227,7 @@ def rain_warnings(block: Any) -> list[str]:
         return []
     if block.wavelength_m is None:
         return []  # said of all weather
-    if why := no_rain_echo(block):
+    if why := explain_no_rain_echo(block):
         return [f"rain has no echo for this radar: {why}"]
     frequency_hz = SPEED_OF_LIGHT_M_S / block.wavelength_m
     if frequency_hz <= HIGHEST_RAYLEIGH_HZ:
@@ -244,7 +244,7 @@ _GAS_MATTERS_HZ = 10e9
 _RANGE_WITHOUT_ONE_M = 10e3
 
 
-def gas_left_out(block: Any) -> list[str]:
+def gas_left_out_notes(block: Any) -> list[str]:
     """Return a sentence on clear-air loss of a radar above 10 GHz in a scene without gas.
 
     It is not on by default: a radar calibrated by a range that was measured through air has the air
@@ -328,7 +328,7 @@ class CellsOfWeather(Effect[CellValues]):
 
         def factor(cells: Cells) -> FloatArray:
             loss_db = np.zeros(len(cells))
-            for (_, within), table in zip(on_the_way(block, cells), tables, strict=True):
+            for (_, within), table in zip(cells_on_lines(block, cells), tables, strict=True):
                 length_m = cells.range_m * (within.leaves - within.enters)
                 heights_m = heights_within(cells, within)
                 loss_db += one_way_attenuation_db(length_m, *heights_m, table)

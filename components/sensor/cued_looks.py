@@ -16,7 +16,7 @@ from dsa_des.arrays.column_values import take_rows
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.wake import Wake
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 
 #: The input over which they come.
 PORT = "cues"
@@ -45,7 +45,7 @@ class ConesAhead:
         #: Scans at which all cones had run out, of those that had any.
         self._old = NO_COUNTS
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return at how many scans no cone counted any more, by run."""
         return {"the cues that it has are older than their lasts_s": self._old}
 
@@ -68,7 +68,7 @@ class ConesAhead:
         cued = counts > 0
         old = cued & (np.bincount(scan[live], minlength=len(counts)) == 0)
         run = wake.run
-        self._old = with_cases(self._old, run[old], run[cued])
+        self._old = count_cases(self._old, run[old], run[cued])
         scan, entry, time_s = scan[live], entry[live], time_s[live]
         if len(scan) == 0:
             return None
@@ -108,12 +108,14 @@ class ConesAhead:
         if self._cones is None or not len(false):
             return detections
         row = detections.row_of_entries[false]
-        inside = self.in_cones(row, detections.azimuth_rad[false], detections.elevation_rad[false])
+        inside = self.is_in_cones(
+            row, detections.azimuth_rad[false], detections.elevation_rad[false]
+        )
         cued = detections.extras["cued"].copy()
         cued[false[inside]] = True
         return replace(detections, extras={**detections.extras, "cued": cued})
 
-    def in_cones(
+    def is_in_cones(
         self, row: IntArray, azimuth_rad: FloatArray, elevation_rad: FloatArray
     ) -> BoolArray:
         """Return which directions in body axes lie in a cone of their row in the last call."""
@@ -150,7 +152,7 @@ class CuedLooks(Effect[ConesAhead]):
         return Verdict(True, f"{' and '.join(sources)} cues it")
 
     def build(self, block: Any) -> ConesAhead:
-        """Return what finds targets in cones."""
+        """Return a function that finds targets in cue cones."""
         return ConesAhead()
 
 

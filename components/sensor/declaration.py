@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from components.geometry import body_to_ned, unit_vector
-from components.messages.detections import REPORT, Detections, Reporting
+from components.messages.detections import REPORT, Detections, ReportTransform
 from components.sensor.look import DECLARATION, Cells, Judging, Look
 from dsa_des.arrays.run_ticks import RunTicks, next_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 
 
-def no_looks_yet(n: int, targets: int) -> BoolArray:
+def empty_look_memory(n: int, targets: int) -> BoolArray:
     """Return the memory before the first look: shape (targets, n - 1), all misses."""
     return np.zeros((targets, n - 1), dtype=bool)
 
@@ -33,7 +33,7 @@ def declare_looks(
     A target is declared at a look if m or more of its last n looks, this one included, detected
     it. Only looks count, each target's in order of time: a scan that did not look at a target
     neither helps nor ages its detections. The memory (targets, n - 1), oldest look first, is
-    `no_looks_yet` or what the last call returned: any division into calls gives the same.
+    `empty_look_memory` or what the last call returned: any division into calls gives the same.
     """
     targets = len(memory)
     # Each target's memory and then its looks, one target after the other.
@@ -70,7 +70,7 @@ class DeclarationRule(Effect[Judging]):
         return Verdict(True, f"declare_m is {m} and declare_n is {n}")
 
     def build(self, block: Any) -> Declarations:
-        """Return what judges the looks of this sensor; 1 of 1 where it has no rule."""
+        """Return the declaration rule of this sensor, 1 of 1 by default."""
         if block.p.declares_by == "place":  # built all the same, it declares whatever is reported
             return Declarations(1, 1)
         return Declarations(block.p.declare_m or 1, block.p.declare_n or 1)
@@ -90,7 +90,7 @@ class Declarations:
         self.m, self.n = m, n
         self.names: tuple[str, ...] = ()
         #: Of all targets of the first run, of the second, and so on.
-        self._memory: BoolArray = no_looks_yet(n, 0)
+        self._memory: BoolArray = empty_look_memory(n, 0)
         self._first_tick: IntArray = np.empty(0, dtype=np.int64)
         self._first_range_m: FloatArray = np.empty(0)
 
@@ -110,7 +110,7 @@ class Declarations:
     def _remember(self, count: int) -> None:
         """Remember so many targets."""
         more = count - len(self._memory)
-        self._memory = np.concatenate([self._memory, no_looks_yet(self.n, more)])
+        self._memory = np.concatenate([self._memory, empty_look_memory(self.n, more)])
         self._first_tick = np.append(self._first_tick, np.full(more, -1))
         self._first_range_m = np.append(self._first_range_m, np.full(more, np.nan))
 
@@ -160,7 +160,7 @@ class SeenPlaces:
         return SeenPlaces(*(values[which] for values in vars(self).values()))
 
     def append(self, later: SeenPlaces) -> SeenPlaces:
-        """Return these and later ones."""
+        """Return the places with later ones appended."""
         both = zip(vars(self).values(), vars(later).values(), strict=True)
         return SeenPlaces(*(np.concatenate(pair) for pair in both))
 
@@ -333,7 +333,7 @@ class DeclaredPlaces:
         return self._first
 
 
-class DeclarationByPlace(Effect[Reporting]):
+class DeclarationByPlace(Effect[ReportTransform]):
     """Marks detections whose position had others in m of the last n scans, targets or false alarms.
 
     Nothing but measured values decides; places are compared in north-east-down by what the

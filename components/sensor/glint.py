@@ -76,7 +76,7 @@ class Wander:
         return azimuth, elevation, np.sqrt(x * x + y * y + z * z)
 
     def lasting(self) -> dict[str, list[LastingPart]]:
-        """Return what wander is in errors that last, by quantity."""
+        """Return the parts of wander that last from look to look, by quantity."""
         share2, lasts_s = self._share**2, self._lasts_s
         return {
             "azimuth": [LastingPart(lasts_s=lasts_s, across_m2=share2 * self._level2)],
@@ -90,7 +90,7 @@ class Wander:
         signal: Mapping[str, FloatArray],
         pixel_rad: tuple[float, float] | None,
     ) -> dict[str, FloatArray]:
-        """Return what wander adds to the variances, by quantity, in the sensor's axes.
+        """Return the variances of wander, by quantity, in the sensor's axes.
 
         `pixel_rad` is the width and height of a pixel of a sensor that measures a target's size
         instead of its range.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from components.geometry import TWO_PI, remainder, rising_sector, wrap_pi
+from components.geometry import TWO_PI, remainder, unwrap_sector, wrap_pi
 from dsa_des.arrays.column_values import constant, null_column
 from dsa_des.arrays.types import FloatArray
 
@@ -212,10 +212,10 @@ class SensorGrid:
         self.variances = {VARIANCE_OF[name]: variance_of_step(step) for name, step in steps.items()}
 
     def __call__(self, cells: Any, detected: Any, look: Any, true: Values) -> Measured:
-        """Return what is measured of true values by quantity, as `ErrorModel` does."""
-        return self.of_noise(true)
+        """Return measured values of true ones by quantity, as `ErrorModel` does."""
+        return self.measure_noise(true)
 
-    def of_noise(self, where: Values, signal: Any = None, drawn: Any = None) -> Measured:
+    def measure_noise(self, where: Values, signal: Any = None, drawn: Any = None) -> Measured:
         """Return values on the grid, and the variances of their rounding: step²/12."""
         line = self.round(where["azimuth"], where["elevation"], where["range"])
         values = dict(zip(("azimuth", "elevation", "range"), line, strict=True))
@@ -247,7 +247,7 @@ class SensorGrid:
     @cached_property
     def _azimuth_sector(self) -> tuple[float, float]:
         """The field of view with its upper edge at or above its lower one."""
-        return rising_sector(*self._field)
+        return unwrap_sector(*self._field)
 
     @cached_property
     def _azimuth_grid(self) -> Grid:

@@ -188,7 +188,7 @@ class Cells:
         return getattr(self._targets, name).take(self._flat // self._width)
 
     def own_belief(self, name: str) -> FloatArray:
-        """Return what the ownship believes of itself, for each cell; see `RelativeTargets`."""
+        """Return the ownship's believed pose for each cell; see `RelativeTargets`."""
         believed = self._targets.believed
         if believed is None:
             raise ValueError("a block on the way does not say what the ownship believes of itself")
@@ -216,9 +216,9 @@ class Cells:
         return self.target if roster.is_shared else roster.craft(self.target, self.run)
 
     @cached_property
-    def equipped(self) -> IntArray:
-        """Where each cell's target stands in the roster's equipage, as it is then."""
-        return self.roster.equipped(self.craft, self.state_ns)
+    def equipage_rows(self) -> IntArray:
+        """Return the row in the roster's equipage of each cell's target at its instant."""
+        return self.roster.equipage_rows(self.craft, self.state_ns)
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
         """Return uniform draws keyed by each cell's target and scan."""
@@ -242,7 +242,7 @@ class CellValues(Protocol):
     """Gives one number for each cell: a factor, a cross-section, an area."""
 
     def __call__(self, cells: Cells, /) -> FloatArray:
-        """Return them, (cells,)."""
+        """Return the values, (cells,)."""
 
 
 def values_of(block: Component, built: CellValues, cells: Cells) -> FloatArray:

@@ -103,7 +103,7 @@ class ErrorModel:
         }
 
     def __call__(self, cells: Cells, detected: IntArray, look: Look, true: Values) -> Measured:
-        """Return what is measured of the `detected` cells, and its variances by column.
+        """Return measured values of the `detected` cells, and their variances by column.
 
         `true` is the truth by quantity, in the sensor's axes.
         """
@@ -113,7 +113,7 @@ class ErrorModel:
         instant_ns = cells.instant_ns[detected]
         if look.noise is not None and self._signal:
             true = self._in_cells(true, look.noise[detected], keys, scan, run, instant_ns)
-        return self.of_noise(true, signal, (keys, scan, instant_ns, run))
+        return self.measure_noise(true, signal, (keys, scan, instant_ns, run))
 
     def _in_cells(
         self,
@@ -157,7 +157,7 @@ class ErrorModel:
             fields["azimuth"] = (low, high)
         return fields
 
-    def of_noise(self, where: Values, signal: Values, drawn: Any) -> Measured:
+    def measure_noise(self, where: Values, signal: Values, drawn: Any) -> Measured:
         """Return how something that is not there is reported: as what is there would be.
 
         `drawn` holds keys, scan, instant and run by which errors are drawn, or is None.
@@ -237,7 +237,7 @@ def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
 
 
 def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError]:
-    """Return what of a sensor's errors lasts from look to look, by quantity."""
+    """Return the sensor errors that last from look to look, by quantity."""
     lasting = {}
     for name, stated in p.stated_errors(steps).items():
         bias = stated.mean_bias_square
@@ -253,7 +253,7 @@ def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError
     return lasting
 
 
-def with_parts(
+def add_error_parts(
     errors: Mapping[str, LastingError], parts: Mapping[str, Iterable[LastingPart]]
 ) -> dict[str, LastingError]:
     """Return lasting errors with more parts, of some quantities."""

@@ -61,7 +61,7 @@ class Measuring(Component):
         return range_m
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return what `Look.signal` adds to the variances, by quantity, in the sensor's axes."""
+        """Return the variances by `Look.signal`, by quantity, in the sensor's axes."""
         raise TypeError(f"{type(self).__name__} has no signal that errors follow from")
 
     @property
@@ -84,7 +84,7 @@ class Measuring(Component):
         elevation_rad: FloatArray,
         range_m: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return what is measured of lines of sight in body axes, and columns beside."""
+        """Return measurements of lines of sight in body axes, with their columns."""
         if self.wander is not None:
             line = azimuth_rad, elevation_rad, range_m
             azimuth_rad, elevation_rad, range_m = self.wander(cells, detected, *line)
@@ -107,7 +107,7 @@ class Measuring(Component):
         without them a position by the edge of the field of view would never be reported beyond it.
         The last value holds the other measured columns of `Detections`.
         """
-        return self._to_body_axes(*self._measurement.of_noise(where, signal, drawn))
+        return self._to_body_axes(*self._measurement.measure_noise(where, signal, drawn))
 
     def _to_body_axes(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]

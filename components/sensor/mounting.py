@@ -43,7 +43,7 @@ class SensorAxes:
         """Return angles in the sensor's axes by the true mounting: physics knows no beliefs."""
         return _from_body(body_azimuth_rad, body_elevation_rad, self.true_rad)
 
-    def pointing(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
+    def true_direction(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
         """Return where directions in the sensor's axes truly point, in body axes."""
         return _to_body(azimuth_rad, elevation_rad, self.true_rad)
 

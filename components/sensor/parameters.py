@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from components.geometry import TWO_PI, rising_sector
+from components.geometry import TWO_PI, unwrap_sector
 from components.messages.reach import Reach
 from components.sensor.grid import Grid, variance_of_step
 from dsa_des.block.component import ClockedParameters
@@ -111,14 +111,14 @@ class ErrorParameters(ClockedParameters):
         Disagreements.refuse(wrong)
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of errors that are switched off."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.errors == "grid":
-            return said + self.idle("quantised", "biases", because="errors is 'grid'")
+            return said + self.note_ineffective("quantised", "biases", because="errors is 'grid'")
         biases = [self._keys(name, unit)[1] for name, unit in self.quantities.items()]
         if not any(getattr(self, key) for key in biases):
-            said += self.idle("biases", because=f"none of {', '.join(biases)} is given")
+            said += self.note_ineffective("biases", because=f"none of {', '.join(biases)} is given")
         return said
 
     @staticmethod
@@ -126,7 +126,7 @@ class ErrorParameters(ClockedParameters):
         return f"{name}_error_{unit}", f"{name}_bias_{unit}", f"{name}_correlation_time_s"
 
     def stated_errors(self, steps: Mapping[str, float]) -> dict[str, StatedError]:
-        """Return what the scene states of quantities with these steps of the grid.
+        """Return the errors that the scene states for quantities with these grid steps.
 
         Nothing of a quantity for which a user's sensor has no such parameters.
         """
@@ -178,15 +178,15 @@ class GlintParameters(ErrorParameters):
         default=0.2, description="Time after which that has forgotten all but 1/e, s."
     )
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of a glint that is switched off."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.errors != "signal":
-            return said + self.idle(
+            return said + self.note_ineffective(
                 "glint_share", "glint_correlation_time_s", because=f"errors is '{self.errors}'"
             )
         if not self.glint_share:
-            said += self.idle("glint_correlation_time_s", because="glint_share is 0")
+            said += self.note_ineffective("glint_correlation_time_s", because="glint_share is 0")
         return said
 
 
@@ -199,7 +199,7 @@ def clockwise_azimuths(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
-def rising_elevations(value: tuple[float, float]) -> tuple[float, float]:
+def check_elevations(value: tuple[float, float]) -> tuple[float, float]:
     """Return a field of view in elevation, deg; refuse one that is none."""
     if not -90 <= value[0] < value[1] <= 90:
         raise ValueError("must hold two angles in [-90, 90], the lower one first")
@@ -225,7 +225,7 @@ class SensorParameters(ErrorParameters):
         default=(-180.0, 180.0),
         description="Field of view in azimuth, clockwise from the first to the second, deg.",
     )
-    elevation_deg: Annotated[tuple[float, float], AfterValidator(rising_elevations)] = Field(
+    elevation_deg: Annotated[tuple[float, float], AfterValidator(check_elevations)] = Field(
         default=(-90.0, 90.0), description="Field of view in elevation, lowest and highest, deg."
     )
     range_km: float | None = Field(
@@ -290,7 +290,7 @@ class SensorParameters(ErrorParameters):
     def _grid_meets_field(self) -> Self:
         reach = self.reach()
         for angle, (low, high) in (
-            ("azimuth", rising_sector(*reach.azimuth_rad)),
+            ("azimuth", unwrap_sector(*reach.azimuth_rad)),
             ("elevation", reach.elevation_rad),
         ):
             step_deg = getattr(self, f"{angle}_resolution_deg")
@@ -306,13 +306,17 @@ class SensorParameters(ErrorParameters):
                 ) from error
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of a declaration rule that is switched off."""
-        said, places = super().without_effect(), ("declare_speed_m_s", "declare_rate_deg_s")
+        said, places = super().ineffective_key_notes(), ("declare_speed_m_s", "declare_rate_deg_s")
         if self.declare_m is None:
-            return said + self.idle("declare_by", *places, because="declare_m is not given")
+            return said + self.note_ineffective(
+                "declare_by", *places, because="declare_m is not given"
+            )
         if self.declares_by == "target":
-            said += self.idle(*places, because="looks at targets are counted (declare_by)")
+            said += self.note_ineffective(
+                *places, because="looks at targets are counted (declare_by)"
+            )
         return said
 
     @property

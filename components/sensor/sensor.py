@@ -18,7 +18,7 @@ from components.messages.detections import (
     REPORT,
     Detections,
     LastingError,
-    Reporting,
+    ReportTransform,
     SensorOffer,
     promises_of_looks,
 )
@@ -34,9 +34,9 @@ from components.sensor.look import DECLARATION, STRENGTH, Cells, Judging, Look, 
 from components.sensor.measurement_errors import (
     MEASUREMENT,
     MeasurementErrors,
+    add_error_parts,
     constant_variances,
     lasting_errors,
-    with_parts,
 )
 from components.sensor.measuring import Measuring
 from components.sensor.mounting import AXES, Mounting
@@ -175,7 +175,7 @@ class Sensor(Measuring):
         constant: dict[str, Any] = constant_variances(self.p, self.steps)
         lasting = lasting_errors(self.p, self.steps)
         if Glint().verdict(self).simulated:
-            lasting = with_parts(lasting, Glint().build(self).lasting())
+            lasting = add_error_parts(lasting, Glint().build(self).lasting())
         reach = self.stated_reach
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
             constant = {**constant, AZIMUTH: None, ELEVATION: None}
@@ -190,7 +190,7 @@ class Sensor(Measuring):
         noise = navigation_noise(self.context)
         if self.turned_by_belief and any(map(any, noise)):  # differs with the pose
             unstated_m2 = 0.0 if self.measures_range else max(noise[0]) ** 2
-            lasting = with_parts(lasting, lasting_navigation(self.context))
+            lasting = add_error_parts(lasting, lasting_navigation(self.context))
             constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}
         return SensorOffer(
             self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,
@@ -215,7 +215,7 @@ class Sensor(Measuring):
         return bool(record is not None and record.looks)
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: every look too, where the scene asks for it."""
+        """Return the recorded message types: every look too, where the scene has that."""
         return [self._message, EveryLook] if self._is_asked_for_looks else [self._message]
 
     @cached_property
@@ -223,7 +223,7 @@ class Sensor(Measuring):
         return self.built(DECLARATION)
 
     @cached_property
-    def _cueing(self) -> ConesAhead | None:
+    def _cue_cones(self) -> ConesAhead | None:
         return self.built_one(CUE)
 
     @cached_property
@@ -231,7 +231,7 @@ class Sensor(Measuring):
         return self.built(STRENGTH)
 
     @cached_property
-    def _reporting(self) -> list[Reporting]:
+    def _report_transforms(self) -> list[ReportTransform]:
         return self.built(REPORT)
 
     def see_targets(
@@ -257,7 +257,7 @@ class Sensor(Measuring):
         held = wake.held("targets")
         if held is None:
             return None
-        cued = None if self._cueing is None else self._cueing(*held, wake)
+        cued = None if self._cue_cones is None else self._cue_cones(*held, wake)
         targets, rows = self.see_targets(*held, cued)
         cells, reason = self.cells(targets, rows, wake)
         if cued is not None:
@@ -315,15 +315,15 @@ class Sensor(Measuring):
             looks=looks_of(cells, decided, len(wake)) if self._is_asked_for_looks else None,
         )
         detections.row_of_entries = row
-        for report in self._reporting:
+        for report in self._report_transforms:
             detections = report(detections, targets, rows)
-        if self._cueing is not None:
-            detections = self._cueing.with_noise(detections)
+        if self._cue_cones is not None:
+            detections = self._cue_cones.with_noise(detections)
         return detections
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
-        """Return what is recorded of each cell beside its detection."""
-        if self._cueing is None:
+        """Return the recorded columns of each cell beside its detection."""
+        if self._cue_cones is None:
             return look.extras
         return {**look.extras, "cued": cells.is_cued()}
 
@@ -336,9 +336,9 @@ class Sensor(Measuring):
         cells = Cells(targets, rows, wanted, wake.scans, wake.ticks, wake.ticks_per_s, wake.run)
         return cells, reason
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how often the cues that it had were too old."""
-        return {} if self._cueing is None else self._cueing.undone()
+        return {} if self._cue_cones is None else self._cue_cones.failure_counts()
 
     def report(self) -> dict[str, Any]:
         """Return when each target was first declared, if the sensor has a rule for it."""

@@ -64,7 +64,7 @@ def _apart_m(block: Any) -> list[float] | None:
     return apart_m
 
 
-def on_the_way(block: Any, cells: Cells) -> Iterator[tuple[WeatherCell, Within]]:
+def cells_on_lines(block: Any, cells: Cells) -> Iterator[tuple[WeatherCell, Within]]:
     """Yield each cell of the weather with what of each line of sight lies in it."""
     place = [cells.of_row(f"own_{name}") for name in ("lat_deg", "lon_deg", "alt_m")]
     line = cells.azimuth_rad, cells.elevation_rad, cells.range_m

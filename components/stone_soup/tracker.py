@@ -161,7 +161,7 @@ class StoneSoupTracker(Component):
             in_time = False
             for look, pose in due.get(row, ()):
                 if look.tick[0] < self._newest:
-                    self._count = self._count.with_looks(self._sensors, look, slice(0), [0])
+                    self._count = self._count.add_looks(self._sensors, look, slice(0), [0])
                     continue
                 in_time = True
                 here |= {one.number: one for one in self._process_look(look, pose, wake)}
@@ -182,7 +182,7 @@ class StoneSoupTracker(Component):
             self._sensors = fused.sensors
             came = scans_of(fused)
             came = replace(came, row=np.flatnonzero(~wake.idle)[came.row])
-            self._count = self._count.with_looks(fused.sensors, came, slice(None), [])
+            self._count = self._count.add_looks(fused.sensors, came, slice(None), [])
         elif self._ahead is not None:
             came = self._ahead.take(np.zeros(0, dtype=np.int64))
         else:
@@ -280,9 +280,9 @@ class StoneSoupTracker(Component):
             **moments,
         )  # fmt: skip
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return whose looks came too late."""
-        return self._count.undone()
+        return self._count.failure_counts()
 
     def report(self) -> dict[str, Any]:
         """Return whose looks came too late."""

@@ -21,7 +21,7 @@ from components.messages.reach import EVALUATE, Reach
 from components.navigation.errors import navigation_noise
 from components.sensor.ladder_values import measure_cells
 from components.sensor.look import Cells, Look
-from components.sensor.parameters import rising_elevations
+from components.sensor.parameters import check_elevations
 from components.surveillance.altimetry import altimetry_variance_ft2
 from components.surveillance.believed_line import OwnBelief, ned_to_body_angles, variances_in_body
 from components.surveillance.broadcast import Altimeters, Transponders
@@ -71,7 +71,7 @@ class ActiveParameters(CooperativeParameters):
 
     may_change: ClassVar[tuple[str, ...]] = ("mode_s_in_1_s", "mode_c_in_1_s")
 
-    elevation_deg: Annotated[tuple[float, float], AfterValidator(rising_elevations)] = Field(
+    elevation_deg: Annotated[tuple[float, float], AfterValidator(check_elevations)] = Field(
         default=(-15.0, 20.0), description="Elevations at which answers come, deg."
     )
     replies: Literal["certain", "rounds"] = Field(
@@ -214,7 +214,7 @@ class Active(CooperativeSensor):
     ) -> FloatArray:  # fmt: skip
         """Return the same of some cells, at ranges and bearings of some instant."""
         equipage = cells.roster.equipage
-        craft = cells.roster.equipped(cells.craft[which], instant_ns)
+        craft = cells.roster.equipage_rows(cells.craft[which], instant_ns)
         mode_s, mode_c = equipage.mode_s[craft], equipage.mode_c[craft]
         within = range_m <= reach_m(azimuth_rad, mode_s)
         in_1_s = np.where(mode_s, self.p.mode_s_in_1_s, self.p.mode_c_in_1_s)
@@ -237,11 +237,11 @@ class Active(CooperativeSensor):
         detected[answered] = placed = self.has_position(cells, answered, now)
         answered, now = answered[placed], now[placed]
         extras = empty_report_columns(len(cells))
-        equipage, craft = cells.roster.equipage, cells.equipped[answered]
+        equipage, craft = cells.roster.equipage, cells.equipage_rows[answered]
         extras["address"][answered] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)
         extras["reported_alt_m"][answered] = now
         extras["reported_s"][answered] = cells.state_ns[answered] / NANOSECONDS
-        detected = self.of_others(cells, detected, extras["address"])
+        detected = self.is_of_others(cells, detected, extras["address"])
         if len(answered):
             extras["reported_climb_m_s"][answered] = self._climb(cells, answered, now)
         return Look(detected, probability, extras)
@@ -305,7 +305,7 @@ class Active(CooperativeSensor):
     def reported_altitude_m(
         self, cells: Cells, which: AnyArray, altitude_m: FloatArray
     ) -> FloatArray:
-        """Return what some cells' transponders report of true altitudes, m."""
+        """Return the altitudes that cells' transponders report for true altitudes, m."""
         step_ft = self._mode_step_ft(cells, which) if self._errs else 0.0
         transponders = Transponders.from_cells(cells, which)
         altitude_m = self.altimeter_m(altitude_m)
@@ -329,7 +329,7 @@ class Active(CooperativeSensor):
             return range_m
         keys = cells.roster.keys_of(cells.target[which])
         drawn = self._ranges(keys, instant_ns, run=cells.run[which])
-        craft = cells.roster.equipped(cells.craft[which], instant_ns)
+        craft = cells.roster.equipage_rows(cells.craft[which], instant_ns)
         bias = np.where(cells.roster.equipage.mode_s[craft], *RANGE_BIAS_M)
         return np.maximum(range_m + bias + RANGE_ERROR_M * drawn, 1.0)
 
@@ -364,7 +364,7 @@ class Active(CooperativeSensor):
             variances = variances_of_replies(
                 ned, deviation**2 + attitude_rad[0] ** 2, max(position_m[:2]) ** 2, altitude,
                 self._step_ft(cells, detected, altitude),
-                cells.roster.equipage.mode_s[cells.equipped[detected]],
+                cells.roster.equipage.mode_s[cells.equipage_rows[detected]],
             )  # fmt: skip
         across, along, vertical = variances
         vertical = vertical + self.p.pressure_deviation_m**2
@@ -378,7 +378,7 @@ class Active(CooperativeSensor):
     ) -> dict[str, FloatArray]:
         """Return the deviations of all errors, as `TOLD`."""
         none = np.zeros(len(detected))
-        mode_s = cells.roster.equipage.mode_s[cells.equipped[detected]]
+        mode_s = cells.roster.equipage.mode_s[cells.equipage_rows[detected]]
         position_m, attitude_rad = navigation_noise(self.context)
         own = own_velocity(cells, detected)
         altimetry_ft2 = altimetry_variance_ft2(altitude_m / FOOT_M)
@@ -399,5 +399,5 @@ class Active(CooperativeSensor):
         return altitude_step_ft(altitude_m / FOOT_M, self._mode_step_ft(cells, which))
 
     def _mode_step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
-        mode_s = cells.roster.equipage.mode_s[cells.equipped[which]]
+        mode_s = cells.roster.equipage.mode_s[cells.equipage_rows[which]]
         return np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)

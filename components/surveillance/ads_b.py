@@ -114,14 +114,14 @@ class AdsBParameters(CooperativeParameters):
             )
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of a reception law that is not chosen."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.reception != "fitted":
             around = "aircraft_around", "airports_around"
-            said += self.idle(*around, because=f"reception is {self.reception!r}")
+            said += self.note_ineffective(*around, because=f"reception is {self.reception!r}")
         if self.heights == "geometric":
-            said += self.idle("pressure_deviation_m", because="heights is 'geometric'")
+            said += self.note_ineffective("pressure_deviation_m", because="heights is 'geometric'")
         return said
 
     def reach(self) -> Reach:
@@ -262,7 +262,7 @@ class AdsB(CooperativeSensor):
             placed = self.has_position(cells, reported, taken[reported])
             detected[reported], reported = placed, reported[placed]
             moves[:, reported] = own_velocity(cells, reported)
-            detected = self.of_others(cells, detected, extras["address"])
+            detected = self.is_of_others(cells, detected, extras["address"])
         signal = {f"own_{axis}": moves[i] for i, axis in enumerate(("north", "east", "down"))}
         self._rows = cells.row, moves
         confidence = np.where(detected, extras["nacp"], 0.0)
@@ -276,7 +276,7 @@ class AdsB(CooperativeSensor):
         if not len(asked):
             return none, none, none
         now_ns = cells.state_ns[asked]
-        oldest_ns = now_ns - self._oldest_age_ns(kind, cells, asked)
+        oldest_ns = now_ns - self._max_message_age_ns(kind, cells, asked)
         count = math.ceil(int((now_ns - oldest_ns).max()) / (SHORTEST_S * NANOSECONDS)) + 1
         senders = Transponders.from_cells(cells, asked)
         number, sent_ns, counts = self._clocks[kind].latest(
@@ -284,7 +284,7 @@ class AdsB(CooperativeSensor):
         )
         counts &= sent_ns > oldest_ns[:, np.newaxis]
         roster = cells.roster
-        craft = roster.equipped(cells.craft[asked][:, np.newaxis], sent_ns)
+        craft = roster.equipage_rows(cells.craft[asked][:, np.newaxis], sent_ns)
         counts &= roster.equipage.ads_b[craft]
         counts &= sent_ns < roster.equipage.silent_after_s[craft] * NANOSECONDS
         row, column = np.nonzero(counts)
@@ -302,7 +302,7 @@ class AdsB(CooperativeSensor):
         newest = counts[some].argmax(axis=1)
         return asked[some], number[some, newest], sent_ns[some, newest]
 
-    def _oldest_age_ns(self, kind: str, cells: Cells, asked: IntArray) -> IntArray:
+    def _max_message_age_ns(self, kind: str, cells: Cells, asked: IntArray) -> IntArray:
         """Return how old a message may be that counts: a position came since the scan before."""
         if kind == "velocity":
             return np.full(len(asked), round(self.p.velocity_age_s * NANOSECONDS))
@@ -348,7 +348,7 @@ class AdsB(CooperativeSensor):
         Before a flight begins its aircraft flew on towards there as it is when the message is sent.
         """
         roster = cells.roster
-        latency_s = roster.equipage.latency_s[roster.equipped(cells.craft[which], sent_ns)]
+        latency_s = roster.equipage.latency_s[roster.equipage_rows(cells.craft[which], sent_ns)]
         instant_ns = sent_ns - np.rint(latency_s * NANOSECONDS).astype(np.int64)
         ahead_s = (instant_ns - cells.state_ns[which]) / NANOSECONDS
         back_s = np.zeros(len(which))
@@ -401,7 +401,7 @@ class AdsB(CooperativeSensor):
         sent_ns = np.rint(said["reported_s"] * NANOSECONDS).astype(np.int64)
         roster = cells.roster
         stated = StatedByAircraft(
-            roster.equipage, roster.equipped(cells.craft[detected], sent_ns), said,
+            roster.equipage, roster.equipage_rows(cells.craft[detected], sent_ns), said,
             errs=self.p.position_errors != "none", rounds=self.p.compact,
             pressure_deviation_m=self.p.pressure_deviation_m, is_geometric=self._is_geometric,
         )  # fmt: skip

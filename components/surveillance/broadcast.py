@@ -49,9 +49,9 @@ class Transponders:
     ) -> Transponders:
         """Return those of some cells' targets, by default as they are at the look."""
         keys = cells.roster.keys_of(cells.target[which])
-        craft = cells.equipped[which]
+        craft = cells.equipage_rows[which]
         if instant_ns is not None:
-            craft = cells.roster.equipped(cells.craft[which], instant_ns)
+            craft = cells.roster.equipage_rows(cells.craft[which], instant_ns)
         return cls(keys, cells.run[which], craft)
 
 

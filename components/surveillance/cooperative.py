@@ -21,7 +21,7 @@ from components.surveillance.reports import CooperativeReports
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Output
 from dsa_des.errors import Disagreements, did_you_mean
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 
 #: Half of the time between positions that a velocity is of; a power of two.
 STEP_S = 1.0 / 64.0
@@ -41,7 +41,7 @@ _MEASURED_KEYS = (
 )  # fmt: skip
 
 
-def _as_read(value: Any) -> Any:
+def _tuple_if_list(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -77,14 +77,16 @@ class CooperativeParameters(SensorParameters):
                 f"{key} is given: a cooperative sensor has no axes and no grid of its own; "
                 "leave it out"
                 for key in _MEASURED_KEYS
-                if key in given and _as_read(given[key]) != fields[key].default
+                if key in given and _tuple_if_list(given[key]) != fields[key].default
             ]
         )
         return given
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key without effect, except keys that may not be given."""
-        return [said for said in super().without_effect() if not said.startswith(_MEASURED_KEYS)]
+        return [
+            said for said in super().ineffective_key_notes() if not said.startswith(_MEASURED_KEYS)
+        ]
 
 
 class CooperativeSensor(Sensor):
@@ -110,7 +112,7 @@ class CooperativeSensor(Sensor):
         return scene_air(self.context.sections)
 
     def altimeter_m(self, height_m: FloatArray) -> FloatArray:
-        """Return what altimeters read at heights, but for their errors, m."""
+        """Return altimeter readings at heights without the instruments' errors, m."""
         if self._air is None:
             return height_m
         return np.asarray(self._air.pressure_altitude_m(height_m))
@@ -154,9 +156,9 @@ class CooperativeSensor(Sensor):
         super().__init__(name, parameters, context)
         self._unplaced = NO_COUNTS
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how many received aircraft sent no altitude, and so have no position, by run."""
-        return {**super().undone(), NO_CODE: self._unplaced}
+        return {**super().failure_counts(), NO_CODE: self._unplaced}
 
     def setup(self) -> None:
         """Refuse to leave out whom there is not."""
@@ -166,7 +168,7 @@ class CooperativeSensor(Sensor):
             if name not in names:
                 raise ValueError(f"leaves_out: there is no {name!r}{did_you_mean(name, names)}")
 
-    def of_others(self, cells: Cells, heard: BoolArray, address: IntArray) -> BoolArray:
+    def is_of_others(self, cells: Cells, heard: BoolArray, address: IntArray) -> BoolArray:
         """Return which received cells are not of an aircraft that is left out by its address."""
         roster = cells.roster
         for name in self.p.leaves_out:
@@ -182,7 +184,7 @@ class CooperativeSensor(Sensor):
         """
         there = np.isfinite(altitude_m)
         run = cells.run[heard]
-        self._unplaced = with_cases(self._unplaced, run[~there], run)
+        self._unplaced = count_cases(self._unplaced, run[~there], run)
         return there
 
     @cached_property

@@ -14,7 +14,7 @@ from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Input, Output
 from dsa_des.block.message import offsets_of
 from dsa_des.block.wake import Wake
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import target_keys
 
@@ -61,7 +61,7 @@ class PositionExchange(Component):
         #: How often nobody could be heard as velocities were not known, of how many scans.
         self._still = NO_COUNTS
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how often nothing moved as far as is known, as behind an FMU that flies."""
         what = "no flights are known beside the positions: nobody has a velocity and is heard"
         return {what: self._still}
@@ -77,7 +77,7 @@ class PositionExchange(Component):
         states: TrafficStates | None = wake["states"]
         if states is None:
             return None
-        self._still = with_cases(
+        self._still = count_cases(
             self._still, wake.run[: len(wake) if states.flights is None else 0], wake.run
         )
         if states.flights is None:

@@ -201,7 +201,7 @@ class PositionFields:
 
 
 def position_fields(messages: Bytes) -> PositionFields:
-    """Return what airborne position messages hold."""
+    """Return the fields of airborne position messages."""
     code, supplement = _field(messages, 32, 5), _field(messages, 39, 1)
     nic = np.full(len(messages), -1)
     for category, both in _TYPE_OF_NIC.items():
@@ -210,7 +210,7 @@ def position_fields(messages: Bytes) -> PositionFields:
     steps = (bits >> 5) << 4 | (bits & 15)
     fine = steps * float(ALTITUDE_STEP_FT) + LOWEST_FT
     return PositionFields(
-        _field(messages, 8, 24), nic, np.where(bits >> 4 & 1, fine, _of_gillham(bits)),
+        _field(messages, 8, 24), nic, np.where(bits >> 4 & 1, fine, _gillham_altitude_ft(bits)),
         _field(messages, 53, 1) == 1, _field(messages, 54, 17), _field(messages, 71, 17),
     )  # fmt: skip
 
@@ -249,7 +249,7 @@ def _gillham(altitude_ft: FloatArray) -> IntArray:
     return bits
 
 
-def _of_gillham(bits: IntArray) -> FloatArray:
+def _gillham_altitude_ft(bits: IntArray) -> FloatArray:
     """Return the altitudes of 12 bits in Gillham's code, ft."""
     coarse, rest = np.zeros_like(bits), np.zeros_like(bits)
     for number, places in ((coarse, _OF_500), (rest, _OF_100)):

@@ -42,7 +42,7 @@ _LEAST_M2 = 1e-4
 
 
 def lasting_errors(position_errors: str, is_geometric: bool = False) -> dict[str, LastingError]:
-    """Return what lasts of what aircraft say: all but rounding, which is taken to last too."""
+    """Return errors of broadcast values that last; rounding is taken to last too."""
     if position_errors == "none":
         return {}
     lasts_s = {} if is_geometric else {"elevation": math.inf}  # an aircraft keeps its altimeter

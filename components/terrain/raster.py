@@ -111,7 +111,7 @@ class ElevationRaster:
         return float(max(steps))
 
     def box(self) -> str:
-        """Return what it covers, for messages."""
+        """Return the bounds of the raster as text, for messages."""
         return (
             f"latitudes {self.south_deg:.6g} to {self.north_deg:.6g}, longitudes "
             f"{self.west_deg:.6g} to {self.east_deg:.6g}"

@@ -56,7 +56,7 @@ def bent_elevation_rad(elevation_rad: Any, range_m: Any, refraction: str = "four
     return np.minimum(bent, 0.5 * np.pi)
 
 
-def dip_rad(height_m: Any, refraction: str = "none") -> Any:
+def horizon_dip_rad(height_m: Any, refraction: str = "none") -> Any:
     """Return the angle (rad, 0 or more) of the horizon below the horizontal at a height (m).
 
     acos(R' / (R' + h)) over a sphere of radius R' = R / (1 - share): 1.01° from 1000 m with

@@ -81,7 +81,7 @@ def pd_at_averages(printed: Cells) -> Made:
         quantity = f"Pd of the {name} class at {km:.2f} km"
         rows.append(printed[f"pd_{name}"].compare(
             quantity, ours, "", "The last digits of both ranges and both Pd are allowed for.",
-            _basis(name), tolerance=_rounding(sensor, dbsm, km)))  # fmt: skip
+            _basis(name), tolerance=_rounding_error_of_pd(sensor, dbsm, km)))  # fmt: skip
         off.append(printed[f"off_{name}"].compare(
             f"how far Pd of the {name} class is off 0.9 (§5.1.3)", 100.0 * abs(ours - 0.9), "%",
             "Percentage points, as there.", _basis(name), again=quantity))  # fmt: skip
@@ -131,7 +131,7 @@ def pd_at_averages(printed: Cells) -> Made:
     return Made.with_figure(rows, "sec_4_1_3", caption, draw, data)
 
 
-def _rounding(sensor: SwerlingParameters, rcs_dbsm: float, range_km: float) -> float:
+def _rounding_error_of_pd(sensor: SwerlingParameters, rcs_dbsm: float, range_km: float) -> float:
     """Return by how much a printed Pd may differ since two ranges and two Pd are rounded."""
     budget = sensor.link_budget()
     near, far = (pd_at(sensor, budget, rcs_dbsm, range_km + step) for step in (-0.005, 0.005))

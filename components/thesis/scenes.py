@@ -45,7 +45,7 @@ def table(name: str) -> dict[str, Any]:
 
 def radar_parameters(name: str = "oasys", **changes: Any) -> SwerlingParameters:
     """Return the parameters of a radar of ``configs/sensors``."""
-    return SwerlingParameters.model_validate({**_without_type(f"sensors/{name}"), **changes})
+    return SwerlingParameters.model_validate({**_block_parameters(f"sensors/{name}"), **changes})
 
 
 def eo_camera(name: str = "afrl_eo") -> Camera:
@@ -78,11 +78,11 @@ def read_csv(name: str) -> list[dict[str, str]]:
 
 
 def _camera(kind: type[Camera], name: str) -> Camera:
-    parameters = kind.Parameters.model_validate(_without_type(f"sensors/{name}"))
+    parameters = kind.Parameters.model_validate(_block_parameters(f"sensors/{name}"))
     return kind(name, parameters, Context(Streams(0)))
 
 
-def _without_type(name: str) -> dict[str, Any]:
+def _block_parameters(name: str) -> dict[str, Any]:
     """Return a block's parameters: without its type, and what it says to the engine of notes."""
     beside = "type", "acknowledged"
     return {key: value for key, value in table(name).items() if key not in beside}

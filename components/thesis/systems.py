@@ -53,8 +53,8 @@ class Errors:
         return _EDGES_KM[bins] + 0.5, mean, spread
 
 
-def _tecvol(printed: Cells) -> tuple[list[Row], Picture, Columns]:
-    """Return what its sensors and its navigation err: rows, the figure and its data."""
+def _tecvol_errors(printed: Cells) -> tuple[list[Row], Picture, Columns]:
+    """Return TECVOL's errors of sensors and navigation: rows, the figure and its data."""
     loaded = scene("systems/tecvol")
     runs, flights = monte_carlo(loaded, REPLICAS), flights_of(Simulation(loaded))
     errors = {name: _errors(runs, flights, name) for name in ("radar", "eo")}
@@ -127,7 +127,7 @@ def _tecvol(printed: Cells) -> tuple[list[Row], Picture, Columns]:
 
 def _errors(runs: list[ThesisRecording], flights: Flights, name: str) -> Errors:
     """Return the errors of what a sensor reports, the ownship flying level to the north."""
-    parts = [_with_own_position(run, name) for run in runs]
+    parts = [_join_own_position(run, name) for run in runs]
     seen = {key: np.concatenate([part[key] for part in parts])
             for key in ("time_s", "ned_azimuth_rad", "ned_elevation_rad", "true_azimuth_rad",
                         "true_elevation_rad", "true_range_m", "range_m", *_PLACE)}  # fmt: skip
@@ -140,8 +140,8 @@ def _errors(runs: list[ThesisRecording], flights: Flights, name: str) -> Errors:
     )
 
 
-def _with_own_position(run: ThesisRecording, name: str) -> dict[str, Any]:
-    """Return what a sensor detected, and where the ownship believed to be then."""
+def _join_own_position(run: ThesisRecording, name: str) -> dict[str, Any]:
+    """Return a sensor's detections with the believed own position of each."""
     result, scans = run.rows("detections", block=name), run.rows("scans", block=name)
     row = np.searchsorted(scans["tick"], result["tick"])
     return {**result, **{key: scans[key][row] for key in _PLACE}}
@@ -204,7 +204,7 @@ def systems(printed: Cells) -> Made:
     swaps = {"afrl_tracked": ["tracker=tracking.hold_last"]}
     runs = {name: run(scene(f"systems/{name}", swaps=swaps.get(name, ()))) for name in SYSTEMS}
     first = {name: first_ranges_km(done) for name, done in runs.items()}
-    statistics, errors, errors_data = _tecvol(printed)
+    statistics, errors, errors_data = _tecvol_errors(printed)
     rows = [
         Row(f"{name}.toml, first detection of {target}", km, "km",
             f"{runs[name].simulation.scene.description}")
@@ -213,10 +213,10 @@ def systems(printed: Cells) -> Made:
         if name not in ("afrl", "afrl_low_threshold")
     ]  # fmt: skip
     rows += [
-        *_afrl(printed, runs, first["afrl"]),
+        *_afrl_rows(printed, runs, first["afrl"]),
         *statistics,
         *_smart_uav(printed),
-        *_parca(printed),
+        *_parca_rows(printed),
     ]
     by_laser = first_ranges_km(runs["smart_uav"], "laser")
     rows += [
@@ -278,7 +278,7 @@ def first_ranges_km(done: SceneRun, block: str = "") -> dict[str, float]:
     return result
 
 
-def _afrl(printed: Cells, runs: dict[str, SceneRun], first: dict[str, float]) -> list[Row]:
+def _afrl_rows(printed: Cells, runs: dict[str, SceneRun], first: dict[str, float]) -> list[Row]:
     """Return what section 2.4.1 says of the cameras and of the flight tests."""
     blocks = runs["afrl"].simulation.scene.blocks
     cameras = [blocks[name].parameters.model_dump() for name in ("left", "centre", "right")]
@@ -347,7 +347,7 @@ def _declarations(printed: Cells, done: SceneRun) -> list[Row]:
     return rows
 
 
-def _parca(printed: Cells) -> list[Row]:
+def _parca_rows(printed: Cells) -> list[Row]:
     """Return how well a camera's track knows the range before and after a weaving flight."""
     tracks = run(scene("tracking/passive_ranging", "blocks.tracker.passive_range_share=10")).rows(
         "state_tracks", track_status="confirmed"

@@ -22,13 +22,13 @@ from components.track_fusion.local_tracks import (
     LocalTracks,
     local_tracks,
     records_of,
-    with_newest,
+    update_newest,
 )
 from components.track_fusion.track_association import (
     MatchRules,
+    drop_strays,
     leaders,
     match_tracks,
-    without_strays,
 )
 from dsa_des.arrays.keyed_table import KeyedTable, turns
 from dsa_des.arrays.run_ticks import last_of_run
@@ -36,7 +36,7 @@ from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import Tries, has_two_bits
+from dsa_des.record.failure_counts import Tries, has_two_bits
 
 # Fused tracks by number: as many as are compared.
 _TRACKS = 64
@@ -163,9 +163,9 @@ class CovarianceIntersection(Component):
         self._reported = empty_fused_tracks()
         self._tries = Tries()
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return the runs in which it never fused tracks of two trackers."""
-        return self._tries.undone(
+        return self._tries.failure_counts(
             "two trackers or more have tracks, and it never puts two of them together", of_two=True
         )
 
@@ -175,7 +175,9 @@ class CovarianceIntersection(Component):
 
     def run(self, wake: Wake) -> StateTracks | None:
         """Process the trackers' reports in order of time, and return the fused tracks."""
-        came = {new.source: self._fresh(new, wake) for new in wake.arrivals("tracks")}
+        came = {
+            new.source: self._select_newest_reports(new, wake) for new in wake.arrivals("tracks")
+        }
         row_of = {name: last_of_run(wake.instants, new.instants) for name, new in came.items()}
         rows = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *row_of.values()]))
         if len(rows) == 0:
@@ -205,7 +207,7 @@ class CovarianceIntersection(Component):
             KeyedTable.concatenate(parts), rows, wake.instants.take(rows), self.sensors
         )
 
-    def _fresh(self, new: Arrivals, wake: Wake) -> Arrivals:
+    def _select_newest_reports(self, new: Arrivals, wake: Wake) -> Arrivals:
         """Return the reports that count: none that another one overtook, one at an instant."""
         made, replica = new.message.tick, new.message.run
         newest = self._newest.get(new.source, np.empty(0, dtype=np.int64))
@@ -254,13 +256,13 @@ class CovarianceIntersection(Component):
             message, replica = came[name].message, wake.run[row]
             index = self.trackers.index(name)
             origin = records.origin[:, np.searchsorted(records.replica, replica)]
-            masks = self._masks(message.sensors)
+            masks = self._sensor_bits(message.sensors)
             came_now, of = local_tracks(message, replica, index, origin, masks, self.p.tentative)
             parts.append(came_now.with_columns(row=row[of]))
             reported_at[index] = row
         return LocalTracks.concatenate(parts), reported_at
 
-    def _masks(self, sensors: Sequence[str]) -> list[int]:
+    def _sensor_bits(self, sensors: Sequence[str]) -> list[int]:
         """Return the bit of each of a tracker's sensors among all."""
         unknown = [name for name in sensors if name not in self.sensors]
         self.sensors = (*self.sensors, *unknown)
@@ -276,18 +278,18 @@ class CovarianceIntersection(Component):
         replica: IntArray,
     ) -> tuple[LocalTracks, KeyedTable]:
         """Return what trackers hold after the reports of some rows, one of each replica."""
-        new = new.with_systems_of(local)
+        new = new.copy_systems(local)
         gone = np.zeros(len(local), dtype=bool)
         for index, rows in enumerate(reported_at):
             gone |= (local.tracker == index) & np.isin(local.replica, replica[np.isin(at, rows)])
         local = LocalTracks.concatenate([local.take(~gone), new])
-        records = with_newest(records, new, self._on_board)
+        records = update_newest(records, new, self._on_board)
         when = records.time_s[np.searchsorted(records.replica, local.replica)]
         now = np.isin(local.replica, replica)
         silent = now & (when - local.updated_s > self.p.drop_after_s)
         idle, busy, when = local.take(~now), local.take(now & ~silent), when[now & ~silent]
         if len(busy):
-            busy = without_strays(self._rules, busy, when)
+            busy = drop_strays(self._rules, busy, when)
             busy, next_number = match_tracks(
                 self._rules, busy, when, len(self.trackers), records.next_number, records.replica
             )

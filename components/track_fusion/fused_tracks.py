@@ -121,7 +121,7 @@ def update_reported(
     replica: IntArray,
     row_of_replica: IntArray,
 ) -> KeyedTable:
-    """Return what is reported of fused tracks, and once of those that are no more."""
+    """Return the reported fused tracks, and once more those that were deleted."""
     count, ranged = len(fused), fused.has_range
     keys, old_keys = (RunTicks(one.replica, one.track) for one in (fused, before))
     old, known = positions_among(old_keys, keys)

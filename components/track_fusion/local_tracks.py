@@ -54,8 +54,8 @@ class LocalTracks(KeyedTable):
         """Return states and covariances at instants (n,) that are not before their own."""
         return motion.predict(self.state, self.covariance, time_s - self.time_s)
 
-    def with_systems_of(self, old: Self) -> Self:
-        """Return them with the fused tracks that they belonged to before."""
+    def copy_systems(self, old: Self) -> Self:
+        """Return the tracks with the fused tracks that they belonged to before."""
         if len(old) == 0 or len(self) == 0:
             return self
         known = old.key()
@@ -150,7 +150,7 @@ def records_of(replicas: IntArray) -> KeyedTable:
     )
 
 
-def with_newest(records: KeyedTable, new: LocalTracks, on_board: BoolArray) -> KeyedTable:
+def update_newest(records: KeyedTable, new: LocalTracks, on_board: BoolArray) -> KeyedTable:
     """Return records that know the newest instant, and where the ownship is.
 
     `on_board` says of each tracker whether it is.

@@ -46,7 +46,7 @@ class Bearing:
 
 
 def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Bearing:
-    """Return what the directions of tracks say of states (6, n) at instants (n,)."""
+    """Return how the tracks' directions constrain states (6, n) at instants (n,)."""
     back_s = tracks.time_s - time_s
     then = state.copy()
     then[:3] += back_s * state[3:]
@@ -133,7 +133,7 @@ def leaders(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
     return order[first], of
 
 
-def without_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -> LocalTracks:
+def drop_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -> LocalTracks:
     """Return tracks, of which those no longer belong that are too far from their leader."""
     member = np.flatnonzero(tracks.system > 0)
     if len(member) == 0:

@@ -226,7 +226,7 @@ class JointProbabilistic(Association):
         for one in kinds:
             if one.measures_range:
                 ranged[one.track] = True
-        changed = part.with_estimates(
+        changed = part.replace_estimates(
             merged,
             contributors=part.contributors | mask,
             updated_by=np.where(hit, mask, part.updated_by),

@@ -18,7 +18,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.message import offsets_of
 from dsa_des.block.wake import Wake
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 
 
 class CueParameters(Parameters):
@@ -89,7 +89,7 @@ class Cues(Component):
         #: Tracks whose cone would be too wide, of how many.
         self._wide = NO_COUNTS
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how many tracks were too uncertain to cue, by run."""
         what = f"a track's cone is wider than most_half_angle_deg ({self.p.most_half_angle_deg:g})"
         return {f"{what} and cues none": self._wide}
@@ -150,7 +150,7 @@ class Cues(Component):
         kept = half <= math.radians(self.p.most_half_angle_deg)
         row = tracks.row_of_entries[entry]
         run = tracks.run[row]
-        self._wide = with_cases(self._wide, run[~kept], run)
+        self._wide = count_cases(self._wide, run[~kept], run)
         return row[kept], entry[kept], half[kept]
 
     def _message(

@@ -49,7 +49,7 @@ class Promises:
 
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...], ticks_per_s: int) -> Self:
-        """Return those of the sensors."""
+        """Return the promises of some sensors."""
         known = (offers.get(name) for name in sensors)
         steps = tuple(one.promises if isinstance(one, SensorOffer) else () for one in known)
         return cls(steps, ticks_per_s)
@@ -79,7 +79,7 @@ class Promises:
         return np.maximum(life, soonest.astype(np.int64))
 
 
-def seeing(misdetections: IntArray) -> BoolArray:
+def find_seeing_sensors(misdetections: IntArray) -> BoolArray:
     """Return which sensors see which tracks, (sensors, n), from their misdetections."""
     return np.asarray(
         (misdetections < BLIND_AFTER)
@@ -107,7 +107,7 @@ def expected_looks(
     if used == 0:
         return looked
     mine = sensors[of]
-    sees = seeing(part.misdetections)
+    sees = find_seeing_sensors(part.misdetections)
     where: tuple[FloatArray, FloatArray, FloatArray] | None = None
     for i, field in enumerate(fields):
         if not used >> i & 1:

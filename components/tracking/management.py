@@ -139,7 +139,7 @@ def initiate_tracks(
 def start_estimates(
     rules: TrackerRules, scans: Scans, pose: SensorPose, codes: IntArray, detection: IntArray
 ) -> Estimates:
-    """Return what is known of a target by one detection alone, of several kinds `codes`."""
+    """Return initial estimates from one detection each, of several kinds `codes`."""
     count = len(detection)
     measured, variance = (
         select_tracks(scans.measured[:3], detection),
@@ -239,11 +239,13 @@ def position_variance(part: TrackStore, *, late: bool = False) -> FloatArray:
     good = np.isfinite(total) & (total >= 0.0)
     if not bool(good.all()):
         number = int(part.number[~good][0])
-        raise ValueError(f"the covariance of track {number} has become singular{_advice(late)}")
+        raise ValueError(
+            f"the covariance of track {number} has become singular{_advise_on_late_looks(late)}"
+        )
     return total
 
 
-def _advice(late: bool) -> str:
+def _advise_on_late_looks(late: bool) -> str:
     if late:
         return (
             " as it was taken back to a late look: late = 'rerun' works on looks in their own "

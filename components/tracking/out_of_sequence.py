@@ -26,7 +26,7 @@ from components.tracking.track_store import TrackStore
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Producer
-from dsa_des.record.undone import NO_COUNTS, with_cases
+from dsa_des.record.failure_counts import NO_COUNTS, count_cases
 from dsa_des.time.clock import ClockSpec
 
 
@@ -235,24 +235,24 @@ class LookCount:
     #: By name of the sensor: of each run those left out, and all (2, runs).
     counts: Mapping[str, IntArray] = field(default_factory=dict)
 
-    def with_looks(
+    def add_looks(
         self, sensors: tuple[str, ...], looks: Scans, came: slice, left_out: IntArray | list[int]
     ) -> "LookCount":
-        """Return the count with more of some looks: those that came, and those left out."""
+        """Return the count with more looks added: those that came, and those left out."""
 
         def runs_of(some: slice | IntArray | list[int], sensor: int) -> IntArray:
             return looks.run[some][(looks.sensors[some] >> sensor & 1).astype(bool)]
 
         return LookCount(
             {
-                name: with_cases(
+                name: count_cases(
                     self.counts.get(name, NO_COUNTS), runs_of(left_out, i), runs_of(came, i)
                 )
                 for i, name in enumerate(sensors)
             }
         )
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return how many looks of each sensor came too late, of how many, by run."""
         return {
             f"a look of {name} comes too late and is left out": counts

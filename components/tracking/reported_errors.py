@@ -82,7 +82,7 @@ class CarriedErrors:
 
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "CarriedErrors":
-        """Return those that some sensors tell of."""
+        """Return the carried errors that some sensors declare."""
         errors = errors_by_sensors(offers)
         mine = np.array([[name in whose for name in sensors] for whose in errors.values()])
         ranging = np.array([one.way in (BEARING, RANGE) for one, _ in errors])

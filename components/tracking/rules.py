@@ -41,7 +41,7 @@ class LastingErrors:
 
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "LastingErrors | None":
-        """Return those of the sensors, or None where all errors are new at every look."""
+        """Return lasting errors of sensors, or None where all errors are new at every look."""
         known = {
             (_QUANTITIES.index(quantity), j): one
             for j, name in enumerate(sensors)
@@ -95,16 +95,16 @@ class LastingErrors:
         rounding = step * step / 12.0
         white, remembered = variance - rounding, 0.0
         if len(self.variance):
-            lasting = _of_cells(self.variance, at)
+            lasting = _take_cells(self.variance, at)
             if self._is_across_angles:
-                lasting = lasting + _of_cells(self.across_m2, at) / np.maximum(range_m, 1.0) ** 2
+                lasting = lasting + _take_cells(self.across_m2, at) / np.maximum(range_m, 1.0) ** 2
             if self._is_shared:
-                share = _of_cells(self.share, at)
+                share = _take_cells(self.share, at)
                 stated = np.maximum(lasting + share * variance, 0.0)
                 lasting = np.where(share > 0.0, stated, lasting)
             white = white - lasting.sum(axis=0)
             # Time over an infinite time constant is 0: nothing is forgotten.
-            forgotten = np.exp(-np.where(seen, since_s, 0.0) / _of_cells(self.lasts_s, at))
+            forgotten = np.exp(-np.where(seen, since_s, 0.0) / _take_cells(self.lasts_s, at))
             remembered = (lasting * forgotten).sum(axis=0)
         safe = np.where(step > 0.0, step, 1.0)
         white = np.maximum(white, 0.0)
@@ -114,7 +114,7 @@ class LastingErrors:
         return np.where(seen, rounding + remembered, 0.0)
 
 
-def _of_cells(values: FloatArray, at: IntArray) -> FloatArray:
+def _take_cells(values: FloatArray, at: IntArray) -> FloatArray:
     """Return values (parts, quantities, sensors) at flat positions in the last two axes."""
     return values.reshape(len(values), values[0].size).take(at, axis=1)
 
@@ -247,20 +247,22 @@ class TrackerParameters(Parameters):
             )
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of an association, rule or lateness that is not chosen."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         if self.association != "jpda":
             because = f"association is '{self.association}'"
-            said += self.idle("jpda_exact_detections", because=because)
+            said += self.note_ineffective("jpda_exact_detections", because=because)
         unused = {
             "m_of_n": ("false_confirmation", "missed_confirmation"),
             "likelihood_ratio": ("confirm_m", "confirm_n"),
         }
-        said += self.idle(*unused[self.initiation], because=f"initiation is '{self.initiation}'")
+        said += self.note_ineffective(
+            *unused[self.initiation], because=f"initiation is '{self.initiation}'"
+        )
         if self.start_gate_probability <= self.gate_probability:
             because = f"gate_probability is {self.gate_probability:g}"
-            said += self.idle("start_gate_probability", because=because)
+            said += self.note_ineffective("start_gate_probability", because=because)
         return said
 
 

@@ -61,7 +61,7 @@ def predict_tracks(rules: TrackerRules, part: TrackStore, tick: IntArray) -> Tra
         return part
     dt_s = (tick - part.tick) / rules.ticks_per_s
     again = dt_s == 0.0  # innovations of one instant add up
-    return part.with_estimates(
+    return part.replace_estimates(
         rules.estimator.predict(part.estimates(), dt_s),
         tick=tick, nis=part.nis * again, freedom=part.freedom * again,
     )  # fmt: skip
@@ -179,7 +179,7 @@ def _retrodict(
     back = rules.estimator.past_model_probabilities(chances, until_s, since_s)
     weights = (back * now.weights[np.newaxis]).sum(axis=1)
     then = Estimates([one.state for one in parts], [one.covariance for one in parts], weights)
-    return now.with_estimates(then, tick=tick), parts, back
+    return now.replace_estimates(then, tick=tick), parts, back
 
 
 def _carry_forward(
@@ -193,7 +193,7 @@ def _carry_forward(
         )
     ]
     weights = _weights_now(back, then.weights, seen.weights, now.weights)
-    return seen.with_estimates(
+    return seen.replace_estimates(
         Estimates([x for x, _ in moved], [p for _, p in moved], weights),
         tick=now.tick,
         updated_tick=np.maximum(now.updated_tick, seen.updated_tick),

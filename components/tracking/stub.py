@@ -21,7 +21,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.message import Message, offsets_of
 from dsa_des.block.wake import Wake
-from dsa_des.record.undone import Tries
+from dsa_des.record.failure_counts import Tries
 
 #: How often what has grown too old is looked for, s.
 _ACTS_EVERY_S = Fraction(1, 2)
@@ -63,7 +63,7 @@ class TrackerStub(Component):
         return WITHOUT_POSE
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: where navigation errs, with the pose believed then."""
+        """Return the recorded message types: with the believed pose where navigation errs."""
         return [TracksWithPose] if navigation_errs(self.context) else [*super().records()]
 
     def setup(self) -> None:
@@ -82,9 +82,9 @@ class TrackerStub(Component):
             for name, one in sensor_offers(self.context.producers).items()
         }
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return in which runs it received false alarms only."""
-        return self._tries.undone("all that it gets are false alarms, and it holds nothing")
+        return self._tries.failure_counts("all that it gets are false alarms, and it holds nothing")
 
     def acts_every_s(self) -> Fraction | None:
         """Return how often what has grown too old is looked for, s."""
@@ -132,7 +132,7 @@ class TrackerStub(Component):
         return self._tracks(fused, wake, updated, targets, last, pool, first)
 
     def _measured_entries(self, wake: Wake) -> tuple[FusedDetections | None, IntArray]:
-        """Return what was measured of targets, and how many entries each row of the wake has."""
+        """Return measurements of targets, and the number of entries of each wake row."""
         busy = wake.without_idle()
         fused = self._nothing if busy is None else busy["fused"]
         counts = np.zeros(len(wake), dtype=np.int64)

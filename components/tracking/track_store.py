@@ -96,10 +96,10 @@ class TrackStore(KeyedTable):
         return self.concatenate([self, ended]).sorted_by_key()
 
     def estimates(self) -> Estimates:
-        """Return what the filter knows of the tracks."""
+        """Return the filter's estimates of the tracks."""
         return Estimates(self.states(), self.covariances(), self.weights)
 
-    def with_estimates(self, estimates: Estimates, **columns: Any) -> Self:
+    def replace_estimates(self, estimates: Estimates, **columns: Any) -> Self:
         """Return the same tracks with other estimates, and other values in some columns."""
         return self.with_columns(**estimate_columns(estimates), **columns)
 
@@ -207,7 +207,7 @@ def state_tracks(
     """Return the message of what is reported, of states that carry so many errors."""
     ticks = wake.ticks[rows]
     if not reported:
-        empty = StateTracks.initial({}).of_runs(wake.run[rows])
+        empty = StateTracks.make_initial({}).of_runs(wake.run[rows])
         empty.tick, empty.offsets = ticks, np.zeros(len(ticks) + 1, dtype=np.int64)
         empty.sensors = sensors
         return empty

@@ -45,7 +45,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
-from dsa_des.record.undone import Tries
+from dsa_des.record.failure_counts import Tries
 
 _NO_ROWS = np.empty(0, dtype=np.int64)
 #: Bits of a mask of sensors.
@@ -127,9 +127,9 @@ class Tracker(Component):
         self._count, self._early = LookCount(), 0
         self._tries = Tries()
 
-    def take_over(self, before: Any) -> None:
+    def adopt_state(self, before: Any) -> None:
         """Go on with the tracks there are, by rules of its own."""
-        super().take_over(before)
+        super().adopt_state(before)
         kept, now = ([m.size for m in one._estimator.models] for one in (before, self))
         if kept != now:
             raise ValueError(
@@ -183,13 +183,13 @@ class Tracker(Component):
             for name, one in offers.items()
         }
 
-    def undone(self) -> dict[str, IntArray]:
+    def failure_counts(self) -> dict[str, IntArray]:
         """Return whose looks came too late, and in which runs no track was confirmed."""
-        return self._count.undone() | self._tries.undone(
+        return self._count.failure_counts() | self._tries.failure_counts(
             "detections came, and no track was ever confirmed"
         )
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Return a sentence for each sensor whose range rates are not used, with the reason."""
         offers = sensor_offers(self.context.producers)
         return [
@@ -257,7 +257,7 @@ class Tracker(Component):
             plan, left_out, kept = plan_of_late(
                 scans, of, begin, self._lag_ticks, rerun=self.p.late == "rerun"
             )
-        self._count = self._count.with_looks(fused.sensors, scans, slice(begin, None), left_out)
+        self._count = self._count.add_looks(fused.sensors, scans, slice(begin, None), left_out)
         moves = scans.velocity if self.rules.rates_of else None
         origin = select_tracks(records.origin, of)
         poses = pose_in_frame(origin, scans.pose[:3], scans.pose[3:], moves)
@@ -294,7 +294,7 @@ class Tracker(Component):
                     records.next_number[of_late], unless_updated=self.p.late == "drop",
                 )  # fmt: skip
                 too_late = plan.look[late[gone]]
-                self._count = self._count.with_looks(fused.sensors, scans, slice(0), too_late)
+                self._count = self._count.add_looks(fused.sensors, scans, slice(0), too_late)
             looks, mine = plan.look[works_now], plan.of[works_now]
             if self._remembers:
                 store = self._remember(store, records, plan, works_now, before)

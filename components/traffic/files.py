@@ -152,7 +152,7 @@ class FileTrafficParameters(RecordedTrafficParameters):
         return tuple(found)
 
     def choice(self) -> TrafficChoice:
-        """Return what is taken of the files."""
+        """Return the selection of the files' aircraft and times."""
         lowest, highest = self.lowest_m, self.highest_m
         offset, place = self.own_moved, self.place
         return TrafficChoice(
@@ -189,7 +189,7 @@ class FileTraffic(RecordedTraffic):
         self._let_ownship_be(parameters.own_flight)
 
     def read(self) -> TrafficFile:
-        """Return what is taken of the files, heights above sea level put above the ellipsoid."""
+        """Return the selected flights of the files, with heights above the ellipsoid."""
         air = self.air if self.p.heights == "geometric" else None
         return traffic_of(self.p, 0.0 if air is None else air.geoid_m)
 

@@ -243,7 +243,7 @@ class FlownFlights:
         others = {viewer: self.nominal(-1)}
         return self.nominal(viewer), WithOthers(self.targets, self.width, others)
 
-    def as_flown(self) -> Fleet:
+    def flown_target_flights(self) -> Fleet:
         """Return the flights of the targets with all manoeuvres."""
         steered = {index: self.of_platform(index) for index in self.steered_targets}
         return WithOthers(self.targets, self.width, steered) if steered else self.targets
@@ -289,7 +289,7 @@ class FlownFlights:
         platforms) count, or all.
         """
         if not self.steered_targets:
-            return self._as_scripted(target, time_s, state)
+            return self._scripted_states(target, time_s, state)
         run, column = np.divmod(target, self.width)
         place = self.place_of_target[column]
         mine, left = place.nonzero()[0], (place == 0).nonzero()[0]
@@ -299,10 +299,10 @@ class FlownFlights:
         if not len(left):
             return flown
         known_of = None if state is None else state.taken(left)
-        others = self._as_scripted(target[left], time_s[left], known_of)
+        others = self._scripted_states(target[left], time_s[left], known_of)
         return assemble_rows([left, mine], [others, flown])
 
-    def _as_scripted(
+    def _scripted_states(
         self, target: IntArray, time_s: FloatArray, state: TrajectoryState | None
     ) -> TrajectoryState:
         """Return the states of targets without their manoeuvres, as in `targets_at`."""
@@ -345,7 +345,7 @@ class FlownFlights:
         others = self.once("targets", key, lambda: self.targets_at(target, times, known=counts))
         mine = np.flatnonzero(np.broadcast_to(columns, shape).reshape(-1) == viewer)
         if len(mine) != time_s.size or viewer < 0:
-            looking = self._looking(viewer, run, known, time_s)
+            looking = self._viewer_state(viewer, run, known, time_s)
         else:
             looking = others.taken(mine).reshape(time_s.shape)
         if len(mine):  # the two have changed places
@@ -369,9 +369,9 @@ class FlownFlights:
         self, run: IntArray, known: IntArray, time_s: FloatArray, viewer: int
     ) -> TrajectoryState:
         """Return states of who looks; see `messages.known_flights.AllFlights`."""
-        return self._looking(viewer, run, known, self._published_s(run, time_s))
+        return self._viewer_state(viewer, run, known, self._published_s(run, time_s))
 
-    def _looking(
+    def _viewer_state(
         self, viewer: int, run: IntArray, known: IntArray, time_s: FloatArray
     ) -> TrajectoryState:
         mine = known[..., self.platforms.index(viewer)]

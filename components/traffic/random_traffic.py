@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
-from components.aircraft.equipage import EquipageShares, with_shares
+from components.aircraft.equipage import EquipageShares, draw_equipage
 from components.flights.closest_approach import RegularTimes, SampleTimes
 from components.flights.many_flights import straight_fleet
 from components.geometry import enu_to_geodetic
@@ -91,7 +91,7 @@ class RandomTraffic(TrafficSource):
         )  # fmt: skip
         aircraft = [p.aircraft] * len(names)
         if p.equipage_shares != EquipageShares():
-            aircraft = with_shares(names, aircraft, p.equipage_shares, self.stream("equipage"))
+            aircraft = draw_equipage(names, aircraft, p.equipage_shares, self.stream("equipage"))
         self.roster = Roster.from_pairs(list(zip(names, aircraft, strict=True)), (own.name, own))
 
     def sample_times(self) -> list[SampleTimes]:

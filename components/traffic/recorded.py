@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from components.aircraft.aircraft import OWNSHIP, Aircraft, Roster
-from components.aircraft.equipage import EquipageShares, with_shares
+from components.aircraft.equipage import EquipageShares, draw_equipage
 from components.flights.attitude import MEDIAN_AZIMUTH_ERROR_DEG
 from components.flights.closest_approach import KnownTimes, SampleTimes
 from components.flights.fleet import Trajectory
@@ -34,8 +34,8 @@ _MISSING = 0.02
 _RADIANS = ("latitude", 1.6, "longitude", 3.2)
 
 
-def suspicions(aircraft: Sequence[SampledTrajectory]) -> list[str]:
-    """Return what is suspicious about the flights of a file, one sentence for each kind."""
+def describe_suspicions(aircraft: Sequence[SampledTrajectory]) -> list[str]:
+    """Return a sentence for each kind of suspicious motion in a file's flights."""
     by_hint: dict[str, list[str]] = {}
     for craft in aircraft:
         for what, hint in _describe_aircraft(craft):
@@ -185,7 +185,7 @@ class RecordedTraffic(TrafficSource):
         )  # fmt: skip
         if parameters.equipage_shares != EquipageShares():
             names, stream = self.roster.names, self.stream("equipage")
-            shared = with_shares(names, self.roster.aircraft, parameters.equipage_shares, stream)
+            shared = draw_equipage(names, self.roster.aircraft, parameters.equipage_shares, stream)
             own = self.roster.own_name, self.roster.own_aircraft[0]
             self.roster = Roster.from_pairs(list(zip(names, shared, strict=True)), own)
 
@@ -256,7 +256,8 @@ class RecordedTraffic(TrafficSource):
         """Return warnings on rows left out, on impossible motion, and on the likely wrong unit."""
         duration_s = float(self.context.duration_s)
         lines = [
-            *self.content.warnings, *self._says_heights(), *suspicions(self.content.aircraft),
+            *self.content.warnings, *self._says_heights(),
+            *describe_suspicions(self.content.aircraft),
             *_coverage(self.own, list(self.targets), duration_s),
         ]  # fmt: skip
         return [f"file {self.file_names()}: {line}" for line in lines]

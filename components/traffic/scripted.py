@@ -68,21 +68,23 @@ class Flight(Heights):
         return self
 
     def in_air(self, air: Air | None) -> Self:
-        """Return it with heights above the ellipsoid in place of altitudes, in a scene's air."""
+        """Return the flight with heights above the ellipsoid for altitudes, in a scene's air."""
         if air is None or self.heights == "geometric":
             return self
 
-        def lifted(one: Any, key: str) -> Any:
+        def replace_altitude(one: Any, key: str) -> Any:
             if getattr(one, key, None) is None:
                 return one
             return one.model_copy(update={key: float(self.height_m(air, getattr(one, key)))})
 
         legs = [
-            leg.model_copy(update={"points": [lifted(point, "alt_m") for point in leg.points]})
-            if isinstance(leg, Waypoints) else lifted(leg, "to_alt_m")
+            leg.model_copy(
+                update={"points": [replace_altitude(point, "alt_m") for point in leg.points]}
+            )
+            if isinstance(leg, Waypoints) else replace_altitude(leg, "to_alt_m")
             for leg in self.legs
         ]  # fmt: skip
-        return cast(Self, lifted(self.model_copy(update={"legs": legs}), "alt_m"))
+        return cast(Self, replace_altitude(self.model_copy(update={"legs": legs}), "alt_m"))
 
 
 class Ownship(Flight, Aircraft):
@@ -129,7 +131,7 @@ class Site(Parameters):
     roll_deg: float = Field(default=0.0, ge=-360, le=360, description="Turn about that axis, deg.")
 
     def to_intruder(self, own: Position, terrain: Any) -> "Intruder":
-        """Return it as an aircraft that stands; offsets count from the ownship's start."""
+        """Return the site as an aircraft that stands; offsets count from the ownship's start."""
         place, offset = (self.lat_deg, self.lon_deg), (self.east_m, self.north_m)
         given, other = (offset, place) if place == (None, None) else (place, offset)
         if None in given or other != (None, None):
@@ -191,7 +193,7 @@ class ScriptedParameters(SourceParameters):
     )
 
     def in_air(self, air: Air | None) -> Self:
-        """Return them with heights in place of all altitudes of flights, in a scene's air."""
+        """Return the parameters with heights for all altitudes of flights, in a scene's air."""
         if air is None:
             return self
         flights = [one.in_air(air) for one in self.intruders]
@@ -268,7 +270,7 @@ def over_the_ground_mps(flight: Flight, name: str, wind: Wind | None) -> float:
 def flight_of(
     flight: Flight, start: Position, wind: Wind | None, reference: Position | None = None
 ) -> ScriptedTrajectory:
-    """Return what a scene says of a flight, from where it starts; see `ScriptedTrajectory`."""
+    """Return the flight that a scene describes, from its start; see `ScriptedTrajectory`."""
     lat_deg, lon_deg, alt_m = start
     return ScriptedTrajectory(
         _name(flight),

@@ -161,7 +161,7 @@ class TrafficSource(Component):
             return replace(envelope, pitch_rad=0.5 * math.pi, roll_rad=math.pi)
         return envelope
 
-    def heed_change(self, from_s: Fraction, other: Any) -> None:
+    def apply_change(self, from_s: Fraction, other: Any) -> None:
         """Carry from an instant on what another instance does; all else of aircraft stays."""
         later = (*self.roster.later, (round(from_s * NANOSECONDS), other.roster))
         self.roster = replace(self.roster, later=later)
@@ -231,7 +231,7 @@ class TrafficSource(Component):
     def prepare(cls, parameters: Sequence[Any]) -> None:
         """Do what can be done at once for blocks with these parameters, which will be made."""
 
-    def together(
+    def make_for_all_runs(
         self, parameters: Sequence[Any], make: Callable[[int], Component]
     ) -> "TrafficSource | None":
         """Return what flies the flights of all runs."""
@@ -275,9 +275,9 @@ class TrafficSource(Component):
         most = sum(view.most_at_once for view in self._views) + len(self._views) - 1
         return min(most, len(self.roster))
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Return a sentence on the range beyond which targets are left out."""
-        return [view.left_out(self.roster.names) for view in self._views if view.culls]
+        return [view.culling_note(self.roster.names) for view in self._views if view.culls]
 
     def run(self, wake: Wake) -> Message | None:
         """Return the state of all aircraft that may matter, at every instant."""
@@ -332,7 +332,7 @@ class TrafficSource(Component):
         self._flown = replace(flown, fleet=fleet)
         assert isinstance(self.own, SteeredFlight)
         self.own = SteeredFlight(self.own.flight, fleet)
-        self.targets = self._flown.as_flown()
+        self.targets = self._flown.flown_target_flights()
         return known
 
     def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
@@ -354,7 +354,7 @@ class TrafficSource(Component):
         return self._flown.platform_at(-1, np.zeros(len(time_s), dtype=np.int64), time_s)
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: the truth where a scene is small, or asks for it."""
+        """Return the recorded message types: the truth where a scene is small, or has that set."""
         return [TrafficStates, TrueStates] if self.says_truth else [TrafficStates]
 
     def sample_times(self) -> list[SampleTimes]:

@@ -56,7 +56,7 @@ class View:
         """Return whether any target may be left out."""
         return self.intervals is not None or self.epochs is not None
 
-    def left_out(self, names: Sequence[str]) -> str:
+    def culling_note(self, names: Sequence[str]) -> str:
         """Return a sentence on the range beyond which targets of these names are left out."""
         whose = "" if self.viewer < 0 else f" on {names[self.viewer]}"
         return (

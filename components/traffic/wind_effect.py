@@ -63,7 +63,7 @@ class CrabAngles(Effect[Crabbing]):
         return Verdict(wind_mps > 0.0, f"[weather] wind_mps is {wind_mps:g}")
 
     def build(self, block: Any) -> Crabbing:
-        """Return what turns the noses."""
+        """Return a function that turns the noses into the wind."""
         wind = scene_wind(block.context.sections["weather"])
         assert wind is not None
         return Crabbing(wind)

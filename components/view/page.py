@@ -47,7 +47,7 @@ class RunPicture:
     eyes: "dict[str, RunPicture]" = field(default_factory=dict)
 
     def to_json_tables(self) -> dict[str, Any]:
-        """Return it for JSON; columns are little-endian numbers in base 64."""
+        """Return the picture for JSON; columns are little-endian numbers in base 64."""
         tables = {name: _pack(table) for name, table in self.tables.items()}
         eyes = {name: picture.to_json_tables() for name, picture in self.eyes.items()}
         return {**vars(self), "tables": tables, "eyes": eyes}

@@ -74,7 +74,7 @@ def _picture_of(
     blocks = run.scene.get("blocks", {})
     picture = RunPicture(
         title=str(run.scene.get("title") or folder.name),
-        facts=_facts(info, run.scene) | ({} if platform is None else {"seen from": platform}),
+        facts=_run_facts(info, run.scene) | ({} if platform is None else {"seen from": platform}),
         duration_s=float(info["duration_s"]),
         sensors=[
             _sensor(name, blocks.get(name, {}), marks[name], carrying.get(name)) for name in sensors
@@ -184,7 +184,7 @@ def _track_numbers_of(column: Any) -> AnyArray:
     return np.where(np.isfinite(numbers), numbers, _NO_TARGET).astype(np.int64)
 
 
-def _facts(info: dict[str, Any], scene: dict[str, Any]) -> dict[str, Any]:
+def _run_facts(info: dict[str, Any], scene: dict[str, Any]) -> dict[str, Any]:
     facts = {"seed": info.get("seed"), "scene": str(info.get("scene_sha256", ""))[:12]}
     versions = info.get("versions")
     if isinstance(versions, dict):

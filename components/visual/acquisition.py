@@ -154,14 +154,14 @@ def _stretches(before_s: FloatArray, shown: AtInstants) -> tuple[IntArray, Float
             continue
         left, right = ends[k][some], ends[k + 1][some]
         first, last = shows[k][some], shows[k + 1][some]
-        edge = _edge(some, left, right, first, last, shown)
+        edge = _find_change_s(some, left, right, first, last, shown)
         cells.append(some)
         begins.append(np.where(first, left, edge))
         stops.append(np.where(last, right, edge))
     return np.concatenate(cells), np.concatenate(begins), np.concatenate(stops)
 
 
-def _edge(
+def _find_change_s(
     cell: IntArray,
     left: FloatArray,
     right: FloatArray,

@@ -30,8 +30,8 @@ from components.sensor.parameters import (
     CorrelationTime,
     ErrorParameters,
     SensorParameters,
+    check_elevations,
     clockwise_azimuths,
-    rising_elevations,
 )
 from components.sensor.sensor import Sensor
 from components.visual.acquisition import (
@@ -68,7 +68,7 @@ class LookoutParameters(SensorParameters):
         description="Field of view from the left seat, clockwise from the first to the second, "
         "deg; that from the right seat is its mirror image.",
     )
-    elevation_deg: Annotated[tuple[float, float], AfterValidator(rising_elevations)] = Field(
+    elevation_deg: Annotated[tuple[float, float], AfterValidator(check_elevations)] = Field(
         default=(-20.0, 35.0), description="Field of view in elevation, lowest and highest, deg."
     )
     left_looking: float = Field(
@@ -142,13 +142,13 @@ class LookoutParameters(SensorParameters):
         both = min(low for low, _ in fields), max(high for _, high in fields)
         return replace(reach, azimuth_rad=both)
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key of a search or a range estimate that is not chosen."""
-        said = super().without_effect()
+        said = super().ineffective_key_notes()
         other = "round_s" if self.search == "random" else "beta_per_sr_s"
-        said += self.idle(other, because=f"search is '{self.search}'")
+        said += self.note_ineffective(other, because=f"search is '{self.search}'")
         if not self.judges_range:
-            said += self.idle(
+            said += self.note_ineffective(
                 "range_error_m", "range_bias_m", "range_correlation_time_s",
                 because="judges_range is false",
             )  # fmt: skip
@@ -314,7 +314,7 @@ class Lookout(Sensor):
             return np.asarray(drawn < -np.expm1(-expected))
         result = np.zeros(len(which), dtype=bool)
         for seat in self._seats:
-            result |= self._meets(seat, cells, which)
+            result |= self._is_met_by_search(seat, cells, which)
         return result
 
     def _search_integral(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
@@ -323,13 +323,13 @@ class Lookout(Sensor):
         if not len(which):
             return before_s
         if self.p.between_scans == "as_at_scan":
-            now = np.where(self._shows(seat, cells)[which], before_s, 0.0)
+            now = np.where(self._is_shown(seat, cells)[which], before_s, 0.0)
             if self.p.search == "round":
                 return now / self.p.round_s
             return now * self._rate(cells)[which]
 
         def shown(some: IntArray, ahead_s: FloatArray) -> BoolArray:
-            return self._shows(seat, _SeenBefore(cells, which[some], ahead_s))
+            return self._is_shown(seat, _SeenBefore(cells, which[some], ahead_s))
 
         def rate(some: IntArray, ahead_s: FloatArray) -> FloatArray:
             if self.p.search == "round":
@@ -338,7 +338,7 @@ class Lookout(Sensor):
 
         return integral_where_shown(before_s, shown, rate)
 
-    def _meets(self, seat: _Seat, cells: Cells, which: IntArray) -> BoolArray:
+    def _is_met_by_search(self, seat: _Seat, cells: Cells, which: IntArray) -> BoolArray:
         """Return at which cells a search that comes round met its aircraft since the last scan."""
         share = self._share(seat, cells, which)
         looks = np.flatnonzero(share > 0.0)
@@ -353,9 +353,9 @@ class Lookout(Sensor):
         met = np.zeros(len(which), dtype=bool)
         if len(in_time) and self.p.between_scans == "integral":
             there = _SeenBefore(cells, mine[in_time], ahead_s[in_time])
-            met[looks[in_time]] = self._shows(seat, there)
+            met[looks[in_time]] = self._is_shown(seat, there)
         elif len(in_time):
-            met[looks[in_time]] = self._shows(seat, cells)[mine[in_time]]
+            met[looks[in_time]] = self._is_shown(seat, cells)[mine[in_time]]
         return met
 
     def _since_last_scan_s(self, cells: Cells, which: IntArray) -> FloatArray:
@@ -387,7 +387,7 @@ class Lookout(Sensor):
             rate = rate * values_of(self, left, view)
         return rate
 
-    def _shows(self, seat: _Seat, view: Any) -> BoolArray:
+    def _is_shown(self, seat: _Seat, view: Any) -> BoolArray:
         """Return which cells of a view show to somebody."""
         azimuth, elevation = self.axes(view.body_azimuth_rad, view.body_elevation_rad)
         shows = seat.field.holds(azimuth, elevation)

@@ -168,10 +168,10 @@ class PairsInPlane:
         step, pair = ((nearest < outer[0]) & (lowest < outer[1]) & (highest > -outer[1])).nonzero()
         apart, moved = self._apart[:, step, pair], self._moved[:, step, pair]
         maybe, surely = np.zeros((2, self._count), dtype=np.bool_)
-        maybe[pair[_enters(apart, moved, *outer)]] = True
+        maybe[pair[_enters_cylinder(apart, moved, *outer)]] = True
         inner = self._widen_size(horizontal_m, -1.0), vertical_m - _MARGIN_M
         if min(inner) > 0.0:
-            surely[pair[_enters(apart, moved, *inner)]] = True
+            surely[pair[_enters_cylinder(apart, moved, *inner)]] = True
         surely &= ~self.beyond
         return surely, (maybe & ~surely) | self.beyond
 
@@ -290,7 +290,7 @@ def _angles_deg(own: FloatArray, other: FloatArray) -> FloatArray:
     return np.array([course - heading, closing - heading])
 
 
-def _enters(
+def _enters_cylinder(
     apart: FloatArray, moved: FloatArray, horizontal_m: float, vertical_m: float
 ) -> BoolArray:
     """Return which straight relative displacements `moved` from `apart`, both (3, n), enter a

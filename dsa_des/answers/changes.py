@@ -65,7 +65,7 @@ class PairedChange:
     @property
     def largest_possible_change(self) -> float:
         """The largest change that the interval leaves possible; NaN where nothing is sure."""
-        if self.reason or self.lost or self.gained or self.difference.few:
+        if self.reason or self.lost or self.gained or self.cut_off or self.difference.few:
             return math.nan
         return max(abs(self.difference.low), abs(self.difference.high))
 

@@ -262,6 +262,10 @@ class AnswerReport:
             parts.append(_presence(change))
         if change.difference.few:
             parts.append("too few events or values to rely on")
+        if change.cut_off:
+            parts.append(
+                f"{change.cut_off:,} of {change.runs:,} cut off where the run begins or ends"
+            )
         if wanted == math.inf:
             parts.append(f"no such number of {self.unit} is foreseen to tell")
         elif wanted == wanted:
@@ -304,7 +308,7 @@ def _remarks(change: PairedChange) -> str:
     if change.neither and change.result.kind == NUMBER:
         parts.append(f"{change.neither:,} without a value with either")
     if change.cut_off:
-        parts.append(f"{change.cut_off:,} cut off by the run, so changed by that much or more")
+        parts.append(f"{change.cut_off:,} cut off by the run, which may hide more")
     return "".join(f"; {part}" for part in parts)
 
 

@@ -128,18 +128,19 @@ def _judge(change: PairedChange, limit: float) -> str:
         return NOTHING
     if interval.few:
         return OPEN
-    if change.identical and change.result.kind in (NUMBER, FRACTION):
+    seen_whole = not change.cut_off  # what the run cut off may have changed by more
+    if change.identical and seen_whole and change.result.kind in (NUMBER, FRACTION):
         return SAME  # its interval is a point, as that of any number without a spread
-    if change.identical:  # of events, so many runs may still have missed the rare one
+    if change.identical and seen_whole:
+        # Of events: so many runs may still have missed the rare one.
         return SAME if -limit <= interval.low and interval.high <= limit else OPEN
     if interval.low > limit or interval.high < -limit:
         return BEYOND
     presence = change.presence
     if presence is not None and (presence.low > 0.0 or presence.high < 0.0):
         return BEYOND
-    if change.lost or change.gained or not (interval.low >= -limit and interval.high <= limit):
-        return OPEN
-    return WITHIN
+    is_within = -limit <= interval.low and interval.high <= limit
+    return WITHIN if is_within and seen_whole and not change.lost and not change.gained else OPEN
 
 
 def _relative_to_limit(amount: float, limit: float) -> float:
@@ -156,6 +157,8 @@ def _size(change: PairedChange, limit: float) -> float:
 
 def _units_needed(change: PairedChange, limit: float) -> float:
     """Return how many units would decide on a limit, if the change keeps its mean and spread."""
+    if change.cut_off:
+        return math.nan  # more of them are cut off as well
     lost = change.lost + change.gained > 0
     room = abs(limit - abs(change.difference.value))
     # Where no run differs an interval shrinks with their number, else with its root.

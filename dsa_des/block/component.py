@@ -250,15 +250,15 @@ class Component:
         """
         return []
 
-    def undone(self) -> Mapping[str, tuple[int, int] | IntArray]:
+    def failure_counts(self) -> Mapping[str, tuple[int, int] | IntArray]:
         """Return how often this block could not do its work: by what lacked, times, of how many.
 
         Asked after it has run; counts are over every row that it has seen. A block that serves all
-        runs gives both of each run, (2, runs) (`dsa_des.record.undone.with_cases`).
+        runs gives both of each run, (2, runs) (`dsa_des.record.failure_counts.count_cases`).
         """
         return {}
 
-    def left_out(self) -> list[str]:
+    def skipped_work_notes(self) -> list[str]:
         """Say, after `setup`, what work this block spares itself and why results allow it."""
         return []
 
@@ -289,14 +289,14 @@ class Component:
         (one,) = built
         return one
 
-    def heed_change(self, from_s: Fraction, other: Any) -> None:
+    def apply_change(self, from_s: Fraction, other: Any) -> None:
         """Be from an instant on what another instance is, that has the parameters of then.
 
         Of a block that `heeds_changes`; called before anything is offered.
         """
         raise TypeError(f"{self.path()} heeds no change")
 
-    def take_over(self, before: "Component") -> None:
+    def adopt_state(self, before: "Component") -> None:
         """Go on from what this block remembers under the parameters that it had `before`.
 
         What it makes at its first wake is not there where it changes before that.
@@ -313,7 +313,7 @@ class Component:
         """Return whether this block may serve replicas in lock step."""
         return type(self).lockstep
 
-    def together(
+    def make_for_all_runs(
         self, parameters: Sequence[Any], make: Callable[[int], "Component"]
     ) -> "Component | None":
         """Return what runs this block for all runs in lock step, or None: one instance each.

@@ -289,7 +289,7 @@ class Message(_Found):
         """
         return derive_columns(type(self)).tables(self)
 
-    def frozen(self, of: Self, source: IntArray, later_s: FloatArray) -> Self:
+    def repeat_rows(self, of: Self, source: IntArray, later_s: FloatArray) -> Self:
         """Return its rows with the entries of rows of another message, as if they were new.
 
         Row i has those of row ``source[i]`` of the other, ``later_s[i]`` older; none where that is
@@ -336,7 +336,7 @@ class Message(_Found):
         return result
 
     @classmethod
-    def initial(cls, values: Mapping[str, Any]) -> Self:
+    def make_initial(cls, values: Mapping[str, Any]) -> Self:
         """Return the message that a delayed wire holds before the first real one.
 
         Parameters

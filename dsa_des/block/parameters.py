@@ -152,11 +152,11 @@ class Parameters(BaseModel):
         refuse_extremes(info.field_name or "", value)
         return value
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Say which keys were given a value that changes nothing, and because of what."""
         return []
 
-    def idle(self, *keys: str, because: str) -> list[str]:
+    def note_ineffective(self, *keys: str, because: str) -> list[str]:
         """Say which keys without effect, `because` of another one, are not at their defaults."""
         fields = type(self).model_fields
         return [

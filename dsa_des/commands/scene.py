@@ -222,7 +222,7 @@ def _plan_effects(
         timed = "" if share is None else f"{share:.1%}"
         rows.append((shorten(item.block), _bound_text(item), timed, item.sentence()))
     for name, component in simulation.stretches[stretch].items():
-        rows += [(shorten(name), "", "", sentence) for sentence in component.left_out()]
+        rows += [(shorten(name), "", "", sentence) for sentence in component.skipped_work_notes()]
     return planned, rows
 
 

@@ -273,7 +273,7 @@ def _tables_as_json(tables: Tables, figures: Sequence[Path]) -> dict[str, Any]:
         "runs": _count(tables),
         "failed": tables.rows.failed,
         "crashed": tables.rows.crashed,
-        "undone": tables.folder.undone(),
+        "undone": tables.folder.failure_counts(),
         **rows,
         "figures": [str(path) for path in figures],
     }

@@ -99,13 +99,13 @@ class Comparison:
             changes.update(report.compare(reference, other))
         return changes
 
-    def remarks(self, changes: Mapping[str, Any]) -> list[str]:
+    def describe_changes(self, changes: Mapping[str, Any]) -> list[str]:
         """Return remarks on changes that no column shows."""
         return [
             remark
             for report in self._reports
-            if hasattr(report, "remarks")
-            for remark in report.remarks(changes)
+            if hasattr(report, "describe_changes")
+            for remark in report.describe_changes(changes)
         ]
 
 

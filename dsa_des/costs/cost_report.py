@@ -80,7 +80,7 @@ def _cells(cost: RungCost, comparison: Comparison) -> list[str]:
         f"{_plain(cost.cpu_us_per_target_scan)} ± {_plain(cost.cpu_spread_us, 1)}",
         *(_NO_ERROR if math.isnan(error) else _plain(error) for error in errors),
         *effects,
-        "; ".join(_remarks(cost) + comparison.remarks(cost.effect)),
+        "; ".join(_remarks(cost) + comparison.describe_changes(cost.effect)),
     ]
 
 

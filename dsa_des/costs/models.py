@@ -37,7 +37,7 @@ def scene_record(where: str, scene: Scene) -> SceneRecord:
                 block=name, type=block.type_name, about=about, rungs=list(filter(None, rungs))
             )
         )
-        spared += [(name, sentence) for sentence in component.left_out()]
+        spared += [(name, sentence) for sentence in component.skipped_work_notes()]
     effects = [
         EffectRecord(
             block=item.block, effect=item.effect.name, simulated=item.built, because=item.because,

@@ -1,4 +1,4 @@
-"""How many runs a lock step holds: as many as memory does, with what is recorded of them."""
+"""How many runs a lock step holds: as many as memory does, and what is recorded of them."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -6,15 +6,16 @@ from dataclasses import dataclass
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
-#: Bytes that runs which run together hold, about, while they do and are measured. A feedback loop
-#: goes through as many windows whatever they hold: with these they take an eighth of the time.
+#: Bytes that runs which run together hold, about: while they do, and then while they are measured.
+#: A feedback loop goes through as many windows whatever they hold: with these they take an eighth
+#: of the time.
 MOST_BYTES = 360e6
 # What a run holds of each aircraft: tracks and tables whatever it is, samples, what a scan makes.
 # 25 to 84 kB were measured of two in four loops of 120 and 180 s and 360 to 3240 scans; of nine
 # 106 to 341 kB in 120 s and 600 scans, and of eight platforms 280 kB in 250 s and 2250 scans.
 _BYTES, _BYTES_PER_S, _BYTES_PER_SCAN = 12.5e3, 137.5, 12.5
-#: What is recorded is there so often at most: as it came, in order, and as a metric has it.
-_COPIES = 3
+#: How often what is recorded is there: as it came, in order, and some of it as a metric has it.
+_COPIES = 2.4
 #: So few runs are together whatever they hold, where two aircraft hold little of the limit.
 FEW = 64
 _SMALL_SHARE = 0.02
@@ -43,7 +44,7 @@ class RunSize:
     @property
     def most(self) -> int:
         """How many such runs a lock step holds."""
-        return max(1, int(MOST_BYTES / (self.held + _COPIES * self.recorded)))
+        return max(1, int(MOST_BYTES / max(self.held, _COPIES * self.recorded)))
 
 
 def are_few(scene: Scene, runs: int) -> bool:

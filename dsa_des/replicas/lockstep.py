@@ -15,8 +15,8 @@ import numpy as np
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import ClockedParameters, Component, Context
 from dsa_des.block.foreign_calls import is_stop_request
+from dsa_des.record.failure_counts import FailuresByRun, counts_by_run
 from dsa_des.record.recording import Recorder
-from dsa_des.record.undone import UndoneByRun, counts_by_run
 from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.running.effects import build_effects
@@ -76,7 +76,7 @@ class Replicas(Timeline):
         #: What runs blocks for all replicas that differ in more than their clocks.
         self.together: dict[str, Component] = {}
         #: What instances of split blocks could not do.
-        self._undone: dict[str, dict[str, IntArray]] = {}
+        self._failures: dict[str, dict[str, IntArray]] = {}
         _check_alike(self._scenes)
         self.seeds = _seeds_of(self._scenes)
         self.streams = Streams(self.seeds)
@@ -130,7 +130,7 @@ class Replicas(Timeline):
             return component
 
         try:
-            return face.together(self._parameters_of(name), make)
+            return face.make_for_all_runs(self._parameters_of(name), make)
         except BaseException as error:
             if is_stop_request(error):
                 raise
@@ -197,14 +197,14 @@ class Replicas(Timeline):
             for number in range(len(self._scenes)):
                 block.make(number)
 
-    def undone(self, components: Mapping[str, Component]) -> UndoneByRun:
+    def failure_counts(self, components: Mapping[str, Component]) -> FailuresByRun:
         """Return what blocks could not do in each run: of those that are split, by instance."""
         shared = {n: c for n, c in components.items() if n not in self.split}
-        return {**super().undone(shared), **self._undone}
+        return {**super().failure_counts(shared), **self._failures}
 
     def _finish(self, number: int, component: Component) -> None:
-        of_all = self._undone.setdefault(component.name, {})
-        for what, counts in counts_by_run(component.undone(), 1).items():
+        of_all = self._failures.setdefault(component.name, {})
+        for what, counts in counts_by_run(component.failure_counts(), 1).items():
             of_all.setdefault(what, np.zeros((2, self.count), dtype=np.int64))
             of_all[what][:, [number]] += counts
         if self._report is not None:

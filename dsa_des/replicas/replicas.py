@@ -9,9 +9,9 @@ import numpy as np
 
 from dsa_des.block.message import Columns, rows_of
 from dsa_des.errors import BlockFailure, SceneError
+from dsa_des.record.failure_counts import FailureCounts, FailuresByRun, add_counts, sum_runs
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
-from dsa_des.record.undone import Undone, UndoneByRun, add_counts, sum_runs
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.drawn_columns import drawn_columns, scenes_of
 from dsa_des.replicas.lock_step_size import RunSize, are_few
@@ -29,7 +29,7 @@ class Shared:
 
     tables: dict[str, Columns]
     replicas: int
-    undone: UndoneByRun
+    failure_counts: FailuresByRun
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Recorded:
 
     `report` returns the sections that blocks add to the summary; `ended_early` says whether a block
     ended the run before its time; `shared` is the recording of which the tables of this `number`
-    are a part, and says what blocks could not do; of a run by itself `undone` does.
+    are a part, and says what blocks could not do; of a run by itself `failure_counts` does.
     """
 
     tables: dict[str, Columns]
@@ -48,7 +48,7 @@ class Recorded:
     ended_early: bool = False
     shared: Shared | None = None
     number: int = 0
-    undone: Undone = field(default_factory=dict)
+    failure_counts: FailureCounts = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def _run_together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Re
         outcome = simulation.run()
     except (NotInLockStep, SceneError, BlockFailure):
         return None
-    shared = Shared(sink.tables(), len(scenes), outcome.undone_by_run)
+    shared = Shared(sink.tables(), len(scenes), outcome.failures_by_run)
     recorder.sinks.clear()  # what ran refers to itself, and would keep the rows for long
     parts = _split_by_replica(shared.tables, len(scenes))
     ended = simulation.runs.ended_by
@@ -180,19 +180,19 @@ def _run_alone(scene: Scene, wanted: Wanted, runs: int) -> Recorded | Failed:
         return Failed(str(error))
     return Recorded(
         sink.tables(), simulation.ticks_per_s, outcome.duration_s, lambda: outcome.report,
-        simulation.runs.early, undone=outcome.undone,
+        simulation.runs.early, failure_counts=outcome.failure_counts,
     )  # fmt: skip
 
 
-def undone_in(outcomes: Iterable[Recorded | Failed]) -> Undone:
+def failure_counts_of_runs(outcomes: Iterable[Recorded | Failed]) -> FailureCounts:
     """Return what blocks could not do in runs, alone or in lock step, together."""
-    parts: list[Undone] = []
+    parts: list[FailureCounts] = []
     together: dict[int, tuple[Shared, list[int]]] = {}
     for one in outcomes:
         if isinstance(one, Recorded):
-            parts.append(one.undone)
+            parts.append(one.failure_counts)
             if (shared := one.shared) is not None:
                 together.setdefault(id(shared), (shared, []))[1].append(one.number)
     return add_counts(
-        [*parts, *(sum_runs(shared.undone, runs) for shared, runs in together.values())]
+        [*parts, *(sum_runs(shared.failure_counts, runs) for shared, runs in together.values())]
     )

@@ -16,7 +16,7 @@ from dsa_des.errors import UsageError
 from dsa_des.files.output_file import PREFIX, lock_file, write_file
 from dsa_des.files.output_names import describe_write_error
 from dsa_des.files.sealed_files import ABOUT, is_sealed, open_lock, read_regular, seal
-from dsa_des.record.undone import Undone, add_counts
+from dsa_des.record.failure_counts import FailureCounts, add_counts
 from dsa_des.results.record import StudyHead, StudyRecord
 
 if TYPE_CHECKING:
@@ -227,12 +227,12 @@ class StudyFolder:
         except (OSError, MemoryError, pa.ArrowException):
             return None
 
-    def undone(self, names: Iterable[str] | None = None) -> Undone:
+    def failure_counts(self, names: Iterable[str] | None = None) -> FailureCounts:
         """Return what blocks could not do in the runs of some parts, by default of all."""
         parts = []
         for name in self.part_names() if names is None else names:
             table = self._read_sealed(self.parts / f"{name}.parquet", name, ["cell"])
-            parts.append({} if table is None else undone_of(table))
+            parts.append({} if table is None else failure_counts_of_part(table))
         return add_counts(parts)
 
     @property
@@ -301,7 +301,7 @@ class StudyFolder:
         return None if table is None else table.replace_schema_metadata(None)
 
 
-def undone_of(table: "pa.Table") -> Undone:
+def failure_counts_of_part(table: "pa.Table") -> FailureCounts:
     """Return what blocks could not do in the runs of a part, as its metadata says."""
     text = (table.schema.metadata or {}).get(ABOUT, b"{}")
     with suppress(ValueError, RecursionError):

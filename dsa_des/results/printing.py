@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from dsa_des.record.undone import undone_sentences
+from dsa_des.record.failure_counts import failure_sentences
 from dsa_des.results.labels import rounded_to, short
 from dsa_des.results.statistics import Estimate
 from dsa_des.results.summary import Answer, Compared, Line, one_sided_confidence
@@ -77,7 +77,7 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     _note_unreached(console, tables)
     if len(lines) < len(tables.lines):
         console.print("all results: summary.parquet, or dsa-des study show FOLDER")
-    for sentence in undone_sentences(tables.folder.undone()):
+    for sentence in failure_sentences(tables.folder.failure_counts()):
         console.print(shorten(sentence, _LONGEST), markup=False, soft_wrap=True)
     if tables.rows.failed:
         console.print(f"{tables.rows.failed} runs failed; `error` and `command` of parts/ say why")

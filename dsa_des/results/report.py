@@ -15,7 +15,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from dsa_des.files.sealed_files import read_regular
-from dsa_des.record.undone import undone_sentences
+from dsa_des.record.failure_counts import failure_sentences
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.labels import AxisName, axis_label, readable, short, value_label
 from dsa_des.results.models import (
@@ -106,7 +106,7 @@ def study_report(folder: StudyFolder) -> bytes:
             (row["cell"], row["replica"], row["status"], row["error"], record.command(row))
             for row in stored.failed
         ],
-        undone=undone_sentences(folder.undone()),
+        undone=failure_sentences(folder.failure_counts()),
         packages=[(name, begun.get(name, ""), now.get(name, "")) for name in {**begun, **now}],
         hashes=_hashes(folder),
         commands=[

@@ -74,7 +74,7 @@ class Assembly:
                     made = self._make_component(name, number)
                     if number and made.heeds_changes:
                         from_s = self._scene.stretches[number - 1].from_s
-                        components[name].heed_change(from_s, made)
+                        components[name].apply_change(from_s, made)
                     else:
                         components[name] = made
         _raise_any(problems)

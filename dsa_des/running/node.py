@@ -137,9 +137,9 @@ class Node:
             ticks = np.array([int(self.simulation.env.now)], dtype=np.int64)
             self.simulation.fail(self, ticks, error)
 
-    def undone(self) -> Mapping[str, IntArray]:
+    def failure_counts(self) -> Mapping[str, IntArray]:
         """Return in which runs it never ran, as counts (2, runs), where there are any."""
-        out = {} if self.outages is None else self.outages.undone()
+        out = {} if self.outages is None else self.outages.failure_counts()
         if self.component.process is not None or self._all_ran:
             return out
         ports = [name for name in self.channels if self.component.inputs[name].is_held]

@@ -99,7 +99,7 @@ def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None
         channel = timeline.channel(wires, _scan_delay(scene, wire, nodes))
         if isinstance(wire.holds, dict):
             declared = nodes[wire.target].component.inputs[wire.input].message
-            channel.hold(declared.initial(wire.holds), 0)
+            channel.hold(declared.make_initial(wire.holds), 0)
         target = nodes[wire.target]
         carrying = target.component.context.platform
         if carrying in nodes[wire.source].component.platforms():

@@ -14,11 +14,11 @@ from dsa_des.errors import OutputError
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_files import to_toml
+from dsa_des.record.failure_counts import failure_sentences
 from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.record.sinks import ObserverSink, attempt
-from dsa_des.record.undone import undone_sentences
 from dsa_des.record.version import __version__
 from dsa_des.running.pacing import Pacer
 from dsa_des.running.reports import draw_all, load_reports, notes_of_scene, say_if_long
@@ -118,7 +118,7 @@ def summary_of(
     return {
         **observers.result(),
         **(attempt("the summary of the blocks", notes, lambda: outcome.report) or {}),
-        **({"undone": outcome.undone} if undone_sentences(outcome.undone) else {}),
+        **({"undone": outcome.failure_counts} if failure_sentences(outcome.failure_counts) else {}),
         "simulated_s": outcome.duration_s,
         "cpu_s": outcome.cpu_s,
         "out": None if target is None else str(target),

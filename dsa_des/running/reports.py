@@ -35,9 +35,9 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
     scene = simulation.scene
     notes = notes_of_loading(scene)
     for name, section in scene.sections.items():
-        notes += [f"{name}: {text}" for text in section.without_effect()]
+        notes += [f"{name}: {text}" for text in section.ineffective_key_notes()]
     for name, component in simulation.components.items():
-        notes += [f"blocks.{name}: {text}" for text in component.p.without_effect()]
+        notes += [f"blocks.{name}: {text}" for text in component.p.ineffective_key_notes()]
         for text in attempt(f"blocks.{name}: warnings", notes, component.warnings) or ():
             notes.append(f"blocks.{name}: {shorten(str(text), _LONGEST)}")
         notes += [f"blocks.{name}: {text}" for text in _vain_times(simulation, name)]
@@ -56,7 +56,7 @@ def _notes_of_stretches(simulation: Simulation, said: list[str]) -> Iterator[str
             if component is before[name]:
                 continue
             notes: list[str] = []
-            texts = list(component.p.without_effect())
+            texts = list(component.p.ineffective_key_notes())
             texts += attempt(f"blocks.{name}: warnings", notes, component.warnings) or ()
             new = [text for text in texts if f"blocks.{name}: {text}" not in said]
             for text in (*notes, *new):
@@ -232,7 +232,7 @@ class Report(Protocol):
     def compare(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
         """Return what changed from one run's recorded tables to another's."""
 
-    def remarks(self, changes: Mapping[str, Any]) -> list[str]:
+    def describe_changes(self, changes: Mapping[str, Any]) -> list[str]:
         """Return what of `compare`'s result is better said in words."""
 
     def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:

@@ -20,8 +20,8 @@ from dsa_des.block.component import Component, ends_its_run
 from dsa_des.block.foreign_calls import error_at, is_stop_request
 from dsa_des.block.message import Message
 from dsa_des.errors import BlockFailure, SceneError
+from dsa_des.record.failure_counts import FailureCounts, FailuresByRun, sum_runs
 from dsa_des.record.recording import NotRecordedError, Recorder
-from dsa_des.record.undone import Undone, UndoneByRun, sum_runs
 from dsa_des.running.assembly import Assembly
 from dsa_des.running.effects import Planned, WrapEffect, timing_plan
 from dsa_des.running.events import Abort
@@ -49,7 +49,7 @@ class Outcome:
     """What a run came to.
 
     Of runs that share a timeline, `duration_s` is the longest it may be. `windowed` are the blocks
-    that ran in look-ahead windows; `components` speak for the whole run. `undone_by_run` is what
+    that ran in look-ahead windows; `components` speak for the whole run. `failures_by_run` is what
     blocks could not do.
     """
 
@@ -57,12 +57,12 @@ class Outcome:
     cpu_s: float
     windowed: list[str]
     components: Mapping[str, Component]
-    undone_by_run: UndoneByRun
+    failures_by_run: FailuresByRun
 
     @cached_property
-    def undone(self) -> Undone:
+    def failure_counts(self) -> FailureCounts:
         """What blocks could not do, over all runs."""
-        return sum_runs(self.undone_by_run, slice(None))
+        return sum_runs(self.failures_by_run, slice(None))
 
     @cached_property
     def report(self) -> dict[str, Any]:
@@ -218,8 +218,8 @@ class Simulation:
                 component.context.duration_s = self.duration_s  # what it reports is up to there
         speaking = self.timeline.finish(self.components)
         stopped = pacer is not None and pacer.stopped
-        idle = {} if stopped else {name: node.undone() for name, node in self.nodes.items()}
-        said = self.timeline.undone(self.components)
+        idle = {} if stopped else {name: node.failure_counts() for name, node in self.nodes.items()}
+        said = self.timeline.failure_counts(self.components)
         return Outcome(
             float(self.duration_s),
             time.process_time() - started,

@@ -12,7 +12,7 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
-from dsa_des.record.undone import UndoneByRun, counts_by_run
+from dsa_des.record.failure_counts import FailuresByRun, counts_by_run
 from dsa_des.running.channel import Channel
 from dsa_des.running.effects import WireFaults, may_be_late
 from dsa_des.running.grain import Grain, grain_of
@@ -168,6 +168,8 @@ class Timeline:
         """Take note that all has run, and return the blocks that speak for the whole run."""
         return components
 
-    def undone(self, components: Mapping[str, Component]) -> UndoneByRun:
+    def failure_counts(self, components: Mapping[str, Component]) -> FailuresByRun:
         """Return what blocks could not do in each run, once they are finished."""
-        return {n: counts_by_run(of.undone(), self.runs.count) for n, of in components.items()}
+        return {
+            n: counts_by_run(of.failure_counts(), self.runs.count) for n, of in components.items()
+        }

@@ -201,7 +201,7 @@ def check_activity(
                 continue
             try:
                 with foreign_code(TypeError, ValueError):
-                    declared.message.initial(wire.holds)
+                    declared.message.make_initial(wire.holds)
             except (TypeError, ValueError, ForeignFailure) as error:
                 scene.report(("wires",), f"{wire}: holds: {error}")
 

@@ -8,7 +8,7 @@ from dsa_des.arrays.run_ticks import RunTicks, last_of_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.undone import SECONDS_FAILED
+from dsa_des.record.failure_counts import SECONDS_FAILED
 from dsa_des.stretches.outage import Outage
 from dsa_des.time.randomness import Streams
 from dsa_des.time.runs import Runs
@@ -97,7 +97,7 @@ class Outages:
         if good.all():
             return message
         later = both.tick[known:] - both.tick[source[known:]]
-        return message.frozen(both, source[known:], later / self._ticks_per_s)
+        return message.repeat_rows(both, source[known:], later / self._ticks_per_s)
 
     def drop_unheard(self, wake: Wake) -> Wake:
         """Return a wake without what arrived while the block was out."""
@@ -115,7 +115,7 @@ class Outages:
         spans = np.concatenate([e.tick.reshape(self._runs.count, -1)[run] for e in self._edges])
         return merge_spans(spans.reshape(-1, 2), int(self._runs.ends[run]))
 
-    def undone(self) -> Mapping[str, IntArray]:
+    def failure_counts(self) -> Mapping[str, IntArray]:
         """Return how many seconds of each run the block had failed, as counts (2, runs)."""
         ends = self._runs.ends
         each = map(self.spans, range(self._runs.count))

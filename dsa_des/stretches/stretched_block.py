@@ -2,7 +2,7 @@
 
 What it is under the parameters of each stretch of time is an instance, set up as a scene of that
 stretch would set it up. A row is handled by the instance of the stretch that it lies in; what the
-block remembers goes on from one to the next (`Component.take_over`).
+block remembers goes on from one to the next (`Component.adopt_state`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -76,5 +76,5 @@ class StretchedBlock:
     def _go_to(self, stretch: int) -> Component:
         before, self._now = self.now, stretch
         if self.now is not before:
-            self.now.take_over(before)
+            self.now.adopt_state(before)
         return self.now

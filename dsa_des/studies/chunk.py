@@ -26,11 +26,11 @@ from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.foreign_calls import error_text, is_stop_request
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.files.sealed_files import parquet
-from dsa_des.record.undone import Undone, add_counts
+from dsa_des.record.failure_counts import FailureCounts, add_counts
 from dsa_des.replicas.changed_scene import Replica, scene_of
 from dsa_des.replicas.lock_step_size import FEW, MOST_BYTES, RunSize, are_few
-from dsa_des.replicas.replicas import Failed, Recorded, run_replicas, undone_in
-from dsa_des.results.folder import undone_of
+from dsa_des.replicas.replicas import Failed, Recorded, failure_counts_of_runs, run_replicas
+from dsa_des.results.folder import failure_counts_of_part
 from dsa_des.results.record import (
     CRASHED,
     DONE,
@@ -107,7 +107,7 @@ def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[Done]:
     began_s = time.process_time()
     schema = schema_of(study)
     tables: list[list[pa.Table]] = [[] for _ in chunks]
-    undone: list[list[Undone]] = [[] for _ in chunks]
+    failure_counts: list[list[FailureCounts]] = [[] for _ in chunks]
     pieces = [
         (cell, k, start, end) for k, one in enumerate(chunks) for cell, start, end in one.runs
     ]
@@ -116,14 +116,14 @@ def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[Done]:
         numbers = [number for _, _, start, end in mine for number in range(start, end)]
         of = np.repeat([k for _, k, _, _ in mine], [end - start for *_, start, end in mine])
         plan = chunks[mine[0][1]].plans.get(cell)
-        rows = _run_cell(study, schema, cell, numbers, plan, of, undone)
+        rows = _run_cell(study, schema, cell, numbers, plan, of, failure_counts)
         begin = 0
         for _, k, start, end in mine:
             tables[k].append(rows.slice(begin, end - start))
             begin += end - start
     done = [
         done_of(chunk.name, pa.concat_tables(parts), add_counts(said))
-        for chunk, parts, said in zip(chunks, tables, undone, strict=True)
+        for chunk, parts, said in zip(chunks, tables, failure_counts, strict=True)
     ]
     runs = sum(map(len, chunks))
     if runs >= _MANY_RUNS:  # blocks know each other in circles: 80 MB of 500 runs
@@ -144,21 +144,23 @@ def crashed_run(study: Study, chunk: Chunk, tries: int) -> Done:
     return done_of(chunk.name, pa.concat_tables(tables), {})
 
 
-def done_of(name: str, table: pa.Table, undone: Undone) -> Done:
+def done_of(name: str, table: pa.Table, counts: FailureCounts) -> Done:
     """Return rows as the result of a chunk, with what blocks could not do in these runs."""
     table = table.combine_chunks()
     status = table["status"].to_pylist()
     failed = len(status) - status.count(DONE)
-    about = json.dumps(undone).encode() if undone else b""
+    about = json.dumps(counts).encode() if counts else b""
     return Done(name, parquet(table, about), table.num_rows, failed, status.count(CRASHED))
 
 
 def join_pieces(name: str, parts: Sequence[Done]) -> Done:
     """Return pieces of a chunk as one, in order of cell and replica."""
     tables = [pq.read_table(pa.BufferReader(part.content)) for part in parts]
-    undone = add_counts(map(undone_of, tables))
+    failure_counts = add_counts(map(failure_counts_of_part, tables))
     rows = pa.concat_tables([table.replace_schema_metadata(None) for table in tables])
-    done = done_of(name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), undone)
+    done = done_of(
+        name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), failure_counts
+    )
     return replace(done, cpu_s=sum(part.cpu_s for part in parts))
 
 
@@ -211,11 +213,11 @@ def _run_cell(
     numbers: Sequence[int],
     plan: Allocation | None,
     of: IntArray,
-    undone: Sequence[list[Undone]],
+    failure_counts: Sequence[list[FailureCounts]],
 ) -> pa.Table:
     """Return the rows of some replicas of a cell, of which those that a plan chooses are flown.
 
-    What blocks could not do in them is put to `undone` of the chunk that each replica is `of`.
+    What blocks could not do is put to `failure_counts` of the chunk that each replica is `of`.
     """
     rows = _leading(study, cell, numbers)
     try:
@@ -233,7 +235,10 @@ def _run_cell(
             nearness: Nearness, runs: Sequence[Replica], number: IntArray
         ) -> tuple[dict[str, AnyArray], list[str | None]]:
             wrong: list[str | None] = [None] * len(runs)
-            chunk_of, said = np.append(of, len(undone)), [*undone, []]  # that of the pilot is lost
+            chunk_of, said = (
+                np.append(of, len(failure_counts)),
+                [*failure_counts, []],
+            )  # that of the pilot is lost
             return _fly_replicas(scene, [nearness], runs, wrong, key, chunk_of[number], said), wrong
 
         rows["error"], values = run_split(
@@ -243,7 +248,7 @@ def _run_cell(
         )  # fmt: skip
         return _table(study, schema, cell, rows, values)
     if not study.allocate:
-        values = _fly_replicas(scene, metrics, replicas, rows["error"], key, of, undone)
+        values = _fly_replicas(scene, metrics, replicas, rows["error"], key, of, failure_counts)
         return _table(study, schema, cell, rows, values)
     known, errors = foresee_all(scene, metrics, replicas)
     for k, text in errors.items():
@@ -253,7 +258,7 @@ def _run_cell(
     these = [k for k in np.flatnonzero(shares).tolist() if k not in errors]
     wrong: list[str | None] = [None] * len(these)
     some = [replicas[k] for k in these]
-    flown = _fly_replicas(scene, metrics, some, wrong, key, of[these], undone)
+    flown = _fly_replicas(scene, metrics, some, wrong, key, of[these], failure_counts)
     for k, said in zip(these, wrong, strict=True):
         rows["error"][k] = said
     values = {}
@@ -270,11 +275,11 @@ def _fly_replicas(
     errors: list[str | None],
     key: tuple[str, int],
     of: IntArray,
-    undone: Sequence[list[Undone]],
+    failure_counts: Sequence[list[FailureCounts]],
 ) -> dict[str, AnyArray]:
     """Run replicas and return result → values.
 
-    What went wrong is put among `errors`, and to `undone` of its chunk what blocks could not do.
+    What went wrong is put among `errors`, what blocks could not do to its chunk's counts.
     """
     values: dict[str, AnyArray] = {}
     done, wanted = 0, columns_wanted(metrics)
@@ -293,7 +298,7 @@ def _fly_replicas(
         outcomes = _outcomes(scene, part, wanted)
         for chunk in np.unique(of[done : done + many]).tolist():
             mine = np.flatnonzero(of[done : done + many] == chunk)
-            undone[chunk].append(undone_in(outcomes[k] for k in mine))
+            failure_counts[chunk].append(failure_counts_of_runs(outcomes[k] for k in mine))
         recorded = [outcome for outcome in outcomes if isinstance(outcome, Recorded)]
         if recorded and size is not None:
             each = sum(map(_bytes_of, recorded)) / len(recorded)

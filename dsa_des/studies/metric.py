@@ -253,7 +253,7 @@ class Metric:
         Called before a study runs, never during it.
         """
 
-    def expected(self, scene: Scene) -> Mapping[str, float]:
+    def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
         """Return the analytic answer for a scene, for results that have one."""
         return {}
 

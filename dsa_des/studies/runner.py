@@ -106,15 +106,15 @@ def _run_round(
         if rows is None or not _is_same_runs(rows, chunk):
             missing.append(chunk)
             continue
-        undone = folder.undone([chunk.name])
-        there = done_of(chunk.name, rows, undone)
+        failure_counts = folder.failure_counts([chunk.name])
+        there = done_of(chunk.name, rows, failure_counts)
         progress.failed += there.failed - there.crashed
         progress.runs += there.runs - there.crashed
         if there.crashed:
             crashed = np.asarray(pc.equal(rows["status"], CRASHED))
             missing.append(replace(chunk, runs=_runs_of(rows.filter(crashed)), whole=False))
             if there.crashed < there.runs:
-                kept[chunk.name] = done_of(chunk.name, rows.filter(~crashed), undone)
+                kept[chunk.name] = done_of(chunk.name, rows.filter(~crashed), failure_counts)
     report(progress)
     try:
         for done in executor.run(study, folder.destination, missing):
@@ -200,7 +200,7 @@ def _expected_answers(study: Study) -> Expected:
             for number in range(many):
                 own = scene_of(scene, study.replica(number, cell))
                 for metric in metrics:
-                    for name, value in metric.expected(own).items():
+                    for name, value in metric.analytic_answers(own).items():
                         sums.setdefault((name, at), []).append(value)
         except (SceneError, ValueError):
             continue

@@ -119,7 +119,7 @@ def test_detections_differ_by_no_more_than_allowed_over_80_scenes(tmp_path: Path
 def explained(configs: Path, *sets: str) -> list[str]:
     """Return what the transform of the first scene says of its models."""
     simulation = Simulation(load_scene(configs / "first_light.toml", sets=sets))
-    return simulation.components["transform"].left_out()
+    return simulation.components["transform"].skipped_work_notes()
 
 
 AUTO = "blocks.transform.model=auto"
@@ -192,7 +192,7 @@ def test_auto_pd_says_why_and_contradicts_a_named_method(configs: Path) -> None:
             configs / "first_light.toml",
             sets=["blocks.radar.model=auto", "blocks.radar.swerling=3", *sets],
         )
-        return " ".join(Simulation(scene).components["radar"].left_out())
+        return " ".join(Simulation(scene).components["radar"].skipped_work_notes())
 
     assert "exact, the reference: [accuracy] allows no error of Pd" in said()
     table = said("accuracy.detection_probability=0.1")
@@ -205,7 +205,7 @@ def test_auto_pd_says_why_and_contradicts_a_named_method(configs: Path) -> None:
 
 def test_auto_camera_stays_and_says_so(configs: Path) -> None:
     scene = load_scene(configs / "first_light.toml", sets=["blocks.eo.model=auto"])
-    said = Simulation(scene).components["eo"].left_out()
+    said = Simulation(scene).components["eo"].skipped_work_notes()
     assert said[-1].startswith("silhouette: convex_hull, as the scene says: for no other")
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from components.alert_configuration.conf_file import read_conf
-from components.alerting.alert_tables import alert_table, without_memory
+from components.alerting.alert_tables import alert_table, remove_hysteresis
 from components.alerting.encounter import read_encounter
 from components.alerting.levels import alert_levels
 from components.arguments.units import FOOT_M
@@ -49,7 +49,7 @@ def test_flown_encounters(flight, memory):
     configuration = read_conf(reference_file("alerting/do365b.conf"))
     path = reference_file(f"nrc_intercepts/NRC_Intercept{flight}.daa")
     name = f"alerting/NRC_Intercept{flight}{'' if memory else '_nohysteresis'}.csv.gz"
-    used = configuration if memory else without_memory(configuration)
+    used = configuration if memory else remove_hysteresis(configuration)
     worst = differences(used, path, reference_text(name), 9)
     assert worst[TIMES].max() < 1e-8
     assert worst[[8, 9, 10, 11, 12, 13, 15]].max() < 1e-8  # separations
@@ -57,7 +57,7 @@ def test_flown_encounters(flight, memory):
 
 @pytest.mark.parametrize(("name", "conf", "states"), STATES)
 def test_random_states(name, conf, states, tmp_path):
-    configuration = without_memory(read_conf(reference_file(f"alerting/{conf}")))
+    configuration = remove_hysteresis(read_conf(reference_file(f"alerting/{conf}")))
     path = tmp_path / "states.xyz"
     path.write_text(reference_text(f"alerting/{states}"), encoding="utf-8")
     worst = differences(configuration, path, reference_text(f"alerting/{name}.csv.gz"), 12)

@@ -110,7 +110,7 @@ def test_tracks_and_sights_at_once_are_refused(tmp_path):
 
 def tracks(number, status=CONFIRMED, **values):
     """One row with one track, 1 km north of a frame at the crooked ownship's start."""
-    made = StateTracks.initial({})
+    made = StateTracks.make_initial({})
     made.offsets = np.array([0, 1])
     own = crooked.OWNSHIP
     fields = {

@@ -13,7 +13,7 @@ from wired import SEES_ALL, chain
 import dsa_des
 from components.display.terminal import show
 from dsa_des.cli import main
-from dsa_des.record.undone import add_counts, undone_sentences
+from dsa_des.record.failure_counts import add_counts, failure_sentences
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
@@ -65,9 +65,9 @@ def alone(tmp_path: Path, duration_s: float = 30.0, conf: str = CONF, **keys: An
     return found
 
 
-def undone(scene: Any) -> Mapping[str, Any]:
+def failure_counts(scene: Any) -> Mapping[str, Any]:
     loaded = dsa_des.load_scene(scene) if isinstance(scene, dict) else scene
-    return Simulation(loaded).run().undone
+    return Simulation(loaded).run().failure_counts
 
 
 def notes(scene: Any) -> list[str]:
@@ -76,10 +76,12 @@ def notes(scene: Any) -> list[str]:
 
 def test_who_has_no_velocity_is_counted(tmp_path: Path) -> None:
     """Two targets at each scan; at the first nobody's velocity is known."""
-    assert undone(alone(tmp_path)) == {"alerting": {NO_VELOCITY: (2, 60)}}
-    assert undone(alone(tmp_path, scan_rate_hz="1/20")) == {"alerting": {NO_VELOCITY: (2, 4)}}
+    assert failure_counts(alone(tmp_path)) == {"alerting": {NO_VELOCITY: (2, 60)}}
+    assert failure_counts(alone(tmp_path, scan_rate_hz="1/20")) == {
+        "alerting": {NO_VELOCITY: (2, 4)}
+    }
     once = alone(tmp_path, scan_rate_hz="1/40", offset_s=3)
-    assert undone(once) == {"alerting": {NO_VELOCITY: (2, 2)}}
+    assert failure_counts(once) == {"alerting": {NO_VELOCITY: (2, 2)}}
     assert [note for note in notes(once) if "which tells no velocity" in note] == [
         "blocks.alerting: scan_rate_hz is 0.025: in 30 s it scans once, which tells no velocity"
     ]
@@ -107,12 +109,12 @@ def test_what_has_no_range_is_counted(tmp_path: Path, tracker: str | None, sourc
     )  # fmt: skip
     eyes["blocks"]["alerting"] = scene["blocks"]["alerting"]
     eyes["wires"] += ["traffic -> alerting", f"{source} -> alerting"]
-    times, of = undone(eyes)["alerting"][NO_RANGE]
+    times, of = failure_counts(eyes)["alerting"][NO_RANGE]
     assert times == of > 30
     # In lock step each run counts, as often as by itself: of a shared block and of a split one.
     for change in ({}, {"blocks.alerting.fit_s": 2.0}):
         scenes = replicas_of(dsa_des.load_scene(eyes), {}, change)
-        assert lock_step(scenes).run().undone == add_counts(map(undone, scenes))
+        assert lock_step(scenes).run().failure_counts == add_counts(map(failure_counts, scenes))
 
 
 def test_a_block_that_nothing_wakes_is_named(tmp_path: Path) -> None:
@@ -121,10 +123,10 @@ def test_a_block_that_nothing_wakes_is_named(tmp_path: Path) -> None:
     late["wires"] = [{"from": "traffic", "to": "alerting"}]
     late["blocks"]["filter"] = {"type": "alerting.m_of_n"}
     late["wires"].append({"from": "alerting", "to": "filter", "delay_s": 40})
-    found = undone(late)["filter"]
+    found = failure_counts(late)["filter"]
     assert found == {"it never ran, for nothing came at alerts": (1, 1)}
     loaded = dsa_des.load_scene(late)
-    assert lock_step(replicas_of(loaded, {}, {})).run().undone["filter"] == {
+    assert lock_step(replicas_of(loaded, {}, {})).run().failure_counts["filter"] == {
         "it never ran, for nothing came at alerts": (2, 2)
     }
 
@@ -193,7 +195,7 @@ def test_a_study_says_it_of_all_its_runs(tmp_path: Path, monkeypatch: Any) -> No
 def test_counts_of_runs_add_up() -> None:
     found = add_counts([{"a": {"x": (1, 4)}}, {"a": {"x": (0, 6), "y": (1, 1)}, "b": {}}])
     assert found == {"a": {"x": (1, 10), "y": (1, 1)}}
-    assert undone_sentences(found) == ["a: x: 1 of 10 (10 %)", "a: y: 1 of 1 (100 %)"]
-    assert undone_sentences({"a": {"x": (1, 11), "y": (9999, 10000)}}) == [
+    assert failure_sentences(found) == ["a: x: 1 of 10 (10 %)", "a: y: 1 of 1 (100 %)"]
+    assert failure_sentences({"a": {"x": (1, 11), "y": (9999, 10000)}}) == [
         "a: y: 9,999 of 10,000 (99.9 %)"
     ]

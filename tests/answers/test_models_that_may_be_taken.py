@@ -184,3 +184,9 @@ def test_a_shift_of_all_values_shifts_their_quantile_by_as_much():
     lost = quantile_difference(values, other, 0.9, 0.95)
     assert (lost.only_first, lost.only_second, lost.paired.count) == (1, 2, 197)
     assert math.isnan(quantile_difference(values[:9], other[:9], 0.95, 0.95).paired.low)
+
+
+def test_what_the_run_cut_off_may_have_changed_by_more():
+    assert kind_of(change(-9.0, 9.0, cut_off=1)).kind == OPEN
+    assert kind_of(change(0.0, 0.0, differing=0, cut_off=100)).kind == OPEN
+    assert kind_of(change(101.0, 300.0, cut_off=100)).kind == BEYOND  # at least by so much

@@ -13,7 +13,7 @@ from dsa_des.running.simulation import Simulation
 
 def said(weather, **keys):
     scene = load_scene(chain({"radar": {**HEARS_ALL, **keys}}, weather=weather))
-    return " ".join(Simulation(scene).components["radar"].left_out())
+    return " ".join(Simulation(scene).components["radar"].skipped_work_notes())
 
 
 @pytest.mark.parametrize(

@@ -141,7 +141,7 @@ def test_it_is_the_nearest_track_that_is_turned_away_from(nearer):
 
 def test_a_rate_is_said_to_be_idle_where_a_bank_is_given():
     rate, bank = {"rate_deg_s": 2.0}, {"bank_deg": 20.0}
-    assert TurnAwayParameters(**rate).without_effect() == []
-    assert TurnAwayParameters(**bank).without_effect() == []
-    (said,) = TurnAwayParameters(**rate, **bank).without_effect()
+    assert TurnAwayParameters(**rate).ineffective_key_notes() == []
+    assert TurnAwayParameters(**bank).ineffective_key_notes() == []
+    (said,) = TurnAwayParameters(**rate, **bank).ineffective_key_notes()
     assert "rate_deg_s" in said and "bank_deg is given" in said

@@ -7,7 +7,7 @@ from components.benchmark.track_updates import (
     LOOKS,
     _looks,
     _start_tracks,
-    listening,
+    make_listening,
     plain_looks,
     plain_updates,
     stone_soup_updates,
@@ -17,7 +17,7 @@ from components.messages.state_tracks import COVARIANCE
 
 
 def test_the_plain_loop_comes_to_the_states_of_our_tracker():
-    block = listening(1, 4)
+    block = make_listening(1, 4)
     scans, places = _looks(block)
     looks = plain_looks(scans, places, block.context.ticks_per_s)
     assert sorted({look.measured.shape[1] for look in looks}) == [2, 3] and len(looks) == LOOKS

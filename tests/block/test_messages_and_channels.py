@@ -90,7 +90,7 @@ def test_static_fields_follow_the_latest_part():
 
 def test_a_message_cannot_be_written_in_a_scene_unless_it_says_how():
     with pytest.raises(ValueError, match="Message cannot be written in a scene"):
-        Message.initial({})
+        Message.make_initial({})
 
 
 def test_text_is_codes_into_names():

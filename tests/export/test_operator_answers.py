@@ -8,6 +8,7 @@ import pyarrow as pa
 import pytest
 
 from components.display.recorded_run import RecordedTables
+from components.export.alert_levels import alerts_of
 from components.export.operator_answers import operator_csv
 from dsa_des.errors import UsageError
 
@@ -53,6 +54,15 @@ def test_every_alert_has_the_first_answers_while_it_lasts():
     assert (other["looked_s"], other["shown_s"], other["judged_s"]) == ("2.5", "", "")
     assert (other["action"], other["climb_m"]) == ("climb", "152.4")  # one manoeuvre, one alert
     assert (again["shown_s"], again["climb_m"], again["looked_s"]) == ("13.0", "-300.0", "")
+
+
+def test_alerts_of_targets_without_tracks_are_apart():
+    """Alerting by the truth has 0 for a track of each."""
+    told = ("time_s", "target", "level", "track")
+    levels = [(1.0, "a", 1, 0), (1.0, "b", 2, 0), (2.0, "a", 0, 0), (2.0, "b", 2, 0)]
+    table = pa.Table.from_pylist([dict(zip(told, row, strict=True)) for row in levels])
+    found = alerts_of(RecordedTables(Path("run"), {"alerts": table}))
+    assert [(one.name, one.end_s) for one in found] == [("a", 2.0), ("b", None)]
 
 
 def test_decisions_about_a_track_belong_to_its_alert():

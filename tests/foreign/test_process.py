@@ -368,6 +368,6 @@ def test_what_is_wrong_with_tracks_is_said(folder, changes, said):
 def test_a_program_that_says_nothing_is_counted(folder, way):
     """It is asked at five looks; nothing comes back, or at the fourth a detection."""
     write_table(folder, "detections", {"azimuth_rad": [0.5], "elevation_rad": [0.1]})
-    found = Simulation(dsa_des.load_scene(scene(canned(way, 4, folder)))).run().undone
+    found = Simulation(dsa_des.load_scene(scene(canned(way, 4, folder)))).run().failure_counts
     silent = {"it was asked and answered with no row": (5, 5)}
     assert found.get("part", {}) == (silent if way == "quiet" else {})

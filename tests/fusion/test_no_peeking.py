@@ -105,7 +105,7 @@ def test_explain_says_that_pick_best_goes_by_the_truth():
     for kind in ("fusion.pick_best", "fusion.gated"):
         scene = chain({"radar": HEARS_ALL}, fusion={"type": kind})
         block = Simulation(dsa_des.load_scene(scene)).components["fusion"]
-        sentences[kind] = " ".join(block.left_out())
+        sentences[kind] = " ".join(block.skipped_work_notes())
     assert "association by truth" in sentences["fusion.pick_best"]
     assert "truth" not in sentences["fusion.gated"]
 

@@ -85,7 +85,7 @@ def test_both_sides_of_every_edge_are_as_they_are_flown(kind, variable):
         values = {**VALUES, "lookahead_time": LOOKAHEAD_S}
         made = kind_of(kind, one_row(OWN), values)
         conflicts = made.find_conflicts(one_row(intruder).columns(), Detector(volume))
-        clear = ~conflicts.unsafe(0.0, HORIZON_S)[0]
+        clear = ~conflicts.is_unsafe(0.0, HORIZON_S)[0]
         zero = int(np.argmin(np.abs(made.values[0] - made.own_value)))
         for place in np.flatnonzero(clear[1:] != clear[:-1]):
             for at in (place, place + 1):

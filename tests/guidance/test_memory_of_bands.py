@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from components.alert_configuration.conf_file import default_values, read_conf
-from components.alerting.alert_tables import TABLE_UNITS, without_memory
+from components.alerting.alert_tables import TABLE_UNITS, remove_hysteresis
 from components.alerting.encounter import read_encounter
 from components.alerting.levels import AlertPairs, alert_levels
 from components.guidance.bands import Resolution, guidance_of_many
@@ -243,6 +243,6 @@ def test_remembered_bands_and_resolutions(flown, name, rows, count):
 
 
 def test_without_hysteresis_nothing_is_remembered(flown):
-    values = without_memory(read_conf(reference_file("alerting/do365b.conf")))
+    values = remove_hysteresis(read_conf(reference_file("alerting/do365b.conf")))
     memory = BandMemory(values, cyclic=False)
     assert shown(memory, red(-2, 5), FREE, own=0.0) == [red(-2, 5), FREE]

@@ -63,7 +63,7 @@ def test_simulation_and_rational_counts_agree(pair: tuple[str, ...], small: Path
     recorded = run_replicas(scene, [Replica(1)], wanted=columns_wanted([metric]))
     group = Group(scene, [Replica(1)], recorded, columns_wanted([metric]))  # type: ignore[arg-type]
     found = metric.measure(group)
-    expected = metric.expected(scene)
+    expected = metric.analytic_answers(scene)
     ours, theirs = (_scans(f, o, duration) for f, o in ((f1, o1), (f2, o2)))
     for name, own, other, rate in (
         ("radar_with_ir", ours, theirs, f1),
@@ -120,7 +120,7 @@ def test_a_scan_waits_for_a_partner_no_longer_than_to_the_next(small: Path) -> N
     metric = MetricSpec("fused_share").build(scene := scene_of_pair(
         ("10", "1", "0", "0", "1/10"), Fraction(6)
     ))  # fmt: skip
-    assert metric.expected(scene) == {
+    assert metric.analytic_answers(scene) == {
         "fused_share.radar_with_ir": 0.2, "fused_share.ir_with_radar": 1.0
     }  # fmt: skip
 

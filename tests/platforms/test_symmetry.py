@@ -14,6 +14,14 @@ NAVIGATION = {
     "navigation": {"position_noise_m": [5, 5, 8], "attitude_noise_deg": [0.2, 0.2, 0.3],
                    "position_correlation_time_s": 30}
 }  # fmt: skip
+#: A shower on the way of both, a radar that freezes, and one that is switched off and on.
+HAPPENS = {
+    "weather": {"cells": [{"lat_deg": 52.03, "lon_deg": 4.44, "radius_km": 1.5,
+                           "rain_rate_mm_h": 30, "speed_mps": 10, "towards_deg": 200}]},
+    "outages": [{"blocks": ["radar_b"], "mean_between_s": 20, "mean_repair_s": 15,
+                 "mode": "frozen"}],
+    "changes": [{"from_s": 30, "to_s": 45, "set": {"blocks.radar.enabled": False}}],
+}  # fmt: skip
 # Off any meridian and parallel, so that nothing is symmetric by chance.
 A = {"name": "a", "lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 1000, "heading_deg": 3,
      "speed_mps": 50, "rcs_dbsm": 2, "swerling": 3}  # fmt: skip
@@ -38,9 +46,9 @@ def test_who_is_called_ownship_makes_no_difference():
     "how",
     [
         {"radar": {**RADAR, "beam_sweep": True}, "tracker": EKF, "decider": PILOT},
-        {"radar": RADAR, "tracker": EKF, "sections": NAVIGATION},
+        {"radar": RADAR, "tracker": EKF, "sections": NAVIGATION | HAPPENS},
     ],
-    ids=["sweeping beam, filter and pilot", "drawn navigation"],
+    ids=["sweeping beam, filter and pilot", "drawn navigation, and much happens"],
 )
 def test_nor_does_it_where_much_is_drawn(how):
     assert_it_makes_no_difference(**how)

@@ -15,7 +15,7 @@ from components.radar.detection.detector_output import (
 from components.radar.resolution import ResolutionCells
 
 # The thesis's radar: ±110° by ±20° at 1°, 76.2 m cells out to 6.5 km.
-OASYS = ResolutionCells.filling(
+OASYS = ResolutionCells.from_reach(
     Reach((math.radians(-110), math.radians(110)), (math.radians(-20), math.radians(20)), 6500.0),
     0.0,
     (math.radians(1), math.radians(1), 76.2),
@@ -116,4 +116,4 @@ def test_bad_input_is_named(call, words):
 def test_more_cells_than_can_be_counted_are_refused():
     reach = Reach((0.0, 1.0), (0.0, 0.1), 100.0)
     with pytest.raises(ValueError, match="1e15"):
-        ResolutionCells.filling(reach, 0.0, (0.1, 0.1, 1e-14))
+        ResolutionCells.from_reach(reach, 0.0, (0.1, 0.1, 1e-14))

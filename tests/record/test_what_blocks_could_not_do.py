@@ -18,7 +18,7 @@ from components.messages.reach import FarthestLook
 from components.surveillance.exchange import PositionExchange
 from dsa_des.arrays.run_ticks import runs_of_single
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.record.undone import Tries, add_counts
+from dsa_des.record.failure_counts import Tries, add_counts
 from dsa_des.replicas.lockstep import lock_step
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
@@ -67,9 +67,9 @@ def scene(sensors: Any, **more: Any) -> dict[str, Any]:
     return chain(sensors, ownship=OWN, targets=TARGETS, **{"duration_s": 10, **more})
 
 
-def undone(scene: Any) -> Mapping[str, Any]:
+def failure_counts(scene: Any) -> Mapping[str, Any]:
     loaded = dsa_des.load_scene(scene) if isinstance(scene, Mapping) else scene
-    return Simulation(loaded).run().undone
+    return Simulation(loaded).run().failure_counts
 
 
 def notes(scene: Any) -> list[str]:
@@ -98,7 +98,7 @@ def test_a_fusion_whose_sensors_never_meet_is_counted_by_runs(fusion: str) -> No
     """Half a second apart, and gates of nothing and of a tenth of a second."""
     apart = {"eye": {**EYE, "offset_s": 0.5}, "radar": RADAR}
     found = scene(apart, fusion={"type": fusion})
-    assert undone(found)["fusion"] == {NOT_TOGETHER: (1, 1)}
+    assert failure_counts(found)["fusion"] == {NOT_TOGETHER: (1, 1)}
     said = [note for note in notes(found) if "never puts" in note]
     assert said == (
         [
@@ -110,10 +110,12 @@ def test_a_fusion_whose_sensors_never_meet_is_counted_by_runs(fusion: str) -> No
     )
     once = {"blocks.eye.offset_s": 0}
     together = replicas_of(dsa_des.load_scene(found), {}, once, {})
-    assert lock_step(together).run().undone == add_counts(map(undone, together))
-    assert undone(together[1])["fusion"] == {NOT_TOGETHER: (0, 1)}
+    assert lock_step(together).run().failure_counts == add_counts(map(failure_counts, together))
+    assert failure_counts(together[1])["fusion"] == {NOT_TOGETHER: (0, 1)}
     alone = scene({"radar": RADAR}, fusion={"type": fusion})
-    assert "fusion" not in undone(alone) and not any("never" in note for note in notes(alone))
+    assert "fusion" not in failure_counts(alone) and not any(
+        "never" in note for note in notes(alone)
+    )
 
 
 @pytest.mark.parametrize(
@@ -141,10 +143,10 @@ def test_trackers_whose_tracks_are_of_others_are_counted() -> None:
         with_tail(found, [f"{side} -> {hands_on} -> {tracks} -> both"], **blocks)
     found["blocks"]["both"] = {"type": "fusion.covariance_intersection"}
     what = "two trackers or more have tracks, and it never puts two of them together"
-    assert undone(found)["both"] == {what: (1, 1)}
+    assert failure_counts(found)["both"] == {what: (1, 1)}
     for side in sides:
         found["blocks"][side]["azimuth_deg"] = [-90.0, 90.0]
-    assert undone(found)["both"] == {what: (0, 1)}
+    assert failure_counts(found)["both"] == {what: (0, 1)}
 
 
 def test_cones_that_are_too_wide_and_too_old_are_counted() -> None:
@@ -156,12 +158,12 @@ def test_cones_that_are_too_wide_and_too_old_are_counted() -> None:
     late = {"from": "cues", "to": "eye", "delay_s": 0.5, "holds": {}}
     with_tail(found, ["tracker -> cues", late], cues={"type": "tracking.cues", "lasts_s": 0.2})
     old = "the cues that it has are older than their lasts_s"
-    times, of = undone(found)["eye"][old]
+    times, of = failure_counts(found)["eye"][old]
     assert times == of == 9
     found["blocks"]["cues"] |= {"lasts_s": 2.0}
-    assert undone(found)["eye"] == {old: (0, 9)}
+    assert failure_counts(found)["eye"] == {old: (0, 9)}
     found["blocks"]["cues"] |= {"most_half_angle_deg": 1.0}
-    ((what, (times, of)),) = undone(found)["cues"].items()
+    ((what, (times, of)),) = failure_counts(found)["cues"].items()
     assert what == "a track's cone is wider than most_half_angle_deg (1) and cues none"
     assert times == of == 20
 
@@ -195,10 +197,10 @@ def test_who_turns_away_by_range_says_that_nobody_measures_any() -> None:
                       tracker={"type": "tracking.hold_last"})  # fmt: skip
         with_tail(found, ["tracker -> turns"], turns={"type": "avoidance.turn_away"})
         assert (never in notes(found)) is (name == "eye")
-        times, of = undone(found)["turns"][counted]
+        times, of = failure_counts(found)["turns"][counted]
         assert of == 20 and times == (20 if name == "eye" else 0)
         found["blocks"]["turns"]["without_range"] = True
-        assert never not in notes(found) and "turns" not in undone(found)
+        assert never not in notes(found) and "turns" not in failure_counts(found)
 
 
 @pytest.mark.parametrize(
@@ -219,12 +221,12 @@ def test_a_tracker_that_never_has_a_track_is_counted(tracker: str, what: str) ->
     found = scene({"radar": noisy}, fusion={"type": "fusion.pass_through"},
                   tracker={"type": tracker})  # fmt: skip
     found["blocks"]["traffic"]["intruders"] = TARGETS[1:]
-    assert undone(found)["tracker"][what] == (1, 1)
+    assert failure_counts(found)["tracker"][what] == (1, 1)
     seen = scene({"radar": STATED}, fusion={"type": "fusion.pass_through"},
                  tracker={"type": tracker})  # fmt: skip
-    assert undone(seen)["tracker"][what] == (0, 1)
+    assert failure_counts(seen)["tracker"][what] == (0, 1)
     runs = replicas_of(dsa_des.load_scene(found), {}, {})
-    assert lock_step(runs).run().undone == add_counts(map(undone, runs))
+    assert lock_step(runs).run().failure_counts == add_counts(map(failure_counts, runs))
 
 
 @pytest.mark.parametrize(
@@ -250,7 +252,7 @@ def test_who_hears_of_nobody_or_of_nobody_s_velocity_says_so(
     strange = "a track is near no target and is not steered for"
     unmoved = "its own velocity is not known yet and it does not steer"
     assert alone not in notes(found)
-    assert undone(found) == {
+    assert failure_counts(found) == {
         "hears": {still: (0, 4)}, "steers": {strange: (0, 8), unmoved: (0, 4)}
     }  # fmt: skip
     run = VoltagePotential.run
@@ -264,10 +266,10 @@ def test_who_hears_of_nobody_or_of_nobody_s_velocity_says_so(
 
     with monkeypatch.context() as patched:
         patched.setattr(VoltagePotential, "run", spoilt)
-        assert undone(found)["steers"] == {strange: (4, 8), unmoved: (2, 4)}
+        assert failure_counts(found)["steers"] == {strange: (4, 8), unmoved: (2, 4)}
     with monkeypatch.context() as patched:  # as of a host, or behind an FMU that flies
         patched.setattr(PositionExchange, "request", lambda self, port: FarthestLook(math.inf))
-        assert undone(found)["hears"] == {still: (4, 4)}
+        assert failure_counts(found)["hears"] == {still: (4, 4)}
     slow = "speed_mps is 40 and most_mps is 18: it never flies its own way any faster"
     slow = f"blocks.steers: {slow}"
     assert slow not in notes(found)
@@ -293,7 +295,7 @@ def test_who_finds_no_way_out_is_counted(pilot: str, tmp_path: Path) -> None:
         alerts={"type": "alerting.daidalus", "conf": str(path), "scan_rate_hz": 1},
         pilot={"type": pilot, "conf": str(path), "level": 1, **keys},
     )  # fmt: skip
-    ((what, (times, of)),) = undone(found)["pilot"].items()
+    ((what, (times, of)),) = failure_counts(found)["pilot"].items()
     assert what == "no change leads clear and the ownship is left alone"
     assert 0 < times == of
 
@@ -302,10 +304,13 @@ def test_tries_of_runs_add_up_whatever_comes_when() -> None:
     tries = Tries().add_tries(np.array([0, 2, 2]), np.array([1, 1, 2]), np.array([False] * 3))
     tries = tries.add_tries(np.array([4, 4, 0]), np.array([1, 2, 1]), np.arange(3) == 1)
     # Run 2, of 2 and 4; 0 and 2, of 0, 2 and 4.
-    assert tries.undone("x", of_two=True)["x"].tolist() == [[0, 0, 1, 0, 0], [0, 0, 1, 0, 1]]
-    assert tries.undone("x")["x"].tolist() == [[1, 0, 1, 0, 0], [1, 0, 1, 0, 1]]
-    assert Tries().undone("x")["x"].shape == (2, 0)
+    assert tries.failure_counts("x", of_two=True)["x"].tolist() == [
+        [0, 0, 1, 0, 0],
+        [0, 0, 1, 0, 1],
+    ]
+    assert tries.failure_counts("x")["x"].tolist() == [[1, 0, 1, 0, 0], [1, 0, 1, 0, 1]]
+    assert Tries().failure_counts("x")["x"].shape == (2, 0)
     alone = Tries().add_tries(runs_of_single(1), np.array([1]), np.array([True]))
     for _ in range(2):  # a second source comes later, and it is done no more
         alone = alone.add_tries(runs_of_single(2), np.array([1, 2]), np.zeros(2, dtype=bool))
-    assert alone.undone("x", of_two=True)["x"].tolist() == [[0], [1]]
+    assert alone.failure_counts("x", of_two=True)["x"].tolist() == [[0], [1]]

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from components.sensor.declaration import declare_looks, no_looks_yet
+from components.sensor.declaration import declare_looks, empty_look_memory
 
 
 def by_hand(detected, m, n):
@@ -22,7 +22,7 @@ def test_ragged_looks_agree_with_counting_by_hand(looks, n, data):
     cut = data.draw(st.integers(0, len(looks)))
     target = np.array([who for who, _ in looks], dtype=int)
     seen = np.array([hit for _, hit in looks], dtype=bool)
-    memory = no_looks_yet(n, 4)
+    memory = empty_look_memory(n, 4)
     first, memory = declare_looks(target[:cut], seen[:cut], m, n, memory)
     second, memory = declare_looks(target[cut:], seen[cut:], m, n, memory)
     declared = np.concatenate((first, second))

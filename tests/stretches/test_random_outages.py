@@ -8,7 +8,7 @@ from test_changes_while_a_run_lasts import change, scans_of, scene
 
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.errors import SceneError
-from dsa_des.record.undone import undone_sentences
+from dsa_des.record.failure_counts import failure_sentences
 from dsa_des.stretches.outage import Outage
 from dsa_des.stretches.outages import Outages
 from dsa_des.time.randomness import Streams
@@ -106,10 +106,10 @@ def test_what_fails_together_is_out_together_and_draws_by_its_name():
     assert (radar == tracker).all()
     other, _ = tables_of(scene(outages=[outage("radar", name="other")]))
     assert not np.array_equal(spans_s(other.timeline.outages("radar")), radar)
-    said = simulation.timeline.outages("radar").undone()["seconds failed"]
+    said = simulation.timeline.outages("radar").failure_counts()["seconds failed"]
     out_s = sum(np.minimum(last, 40e9) - np.minimum(first, 40e9) for first, last in radar) / 1e9
     assert said.tolist() == [[round(out_s)], [40]]
-    assert undone_sentences({"radar": {"seconds failed": (3, 600)}}) == [
+    assert failure_sentences({"radar": {"seconds failed": (3, 600)}}) == [
         "radar: seconds failed: 3 of 600 (0.5 %)"
     ]  # though a block that lacks something so seldom is not worth a sentence
 

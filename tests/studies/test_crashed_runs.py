@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from dsa_des.cli import main
-from dsa_des.results.folder import StudyFolder, undone_of
+from dsa_des.results.folder import StudyFolder, failure_counts_of_part
 from dsa_des.results.record import CRASHED, DONE
 from dsa_des.studies import executors
 from dsa_des.studies.attempts import TRIES, Attempts, halves
@@ -208,13 +208,18 @@ def test_a_part_says_what_its_runs_are_and_what_blocks_could_not_do() -> None:
     what = {"tracker": {"it never had a track": (1, 4)}}
     first = part([3, 1, 2, 0], ["done", "failed", "crashed", "done"], what)
     assert (first.runs, first.failed, first.crashed) == (4, 2, 1)
-    assert undone_of(pq.read_table(pa.BufferReader(first.content))) == what
+    assert failure_counts_of_part(pq.read_table(pa.BufferReader(first.content))) == what
     silent = part([4], ["done"], {})
     table = pq.read_table(pa.BufferReader(silent.content))
-    assert (silent.runs, silent.failed, silent.crashed, undone_of(table)) == (1, 0, 0, {})
+    assert (silent.runs, silent.failed, silent.crashed, failure_counts_of_part(table)) == (
+        1,
+        0,
+        0,
+        {},
+    )
     whole = join_pieces("whole", [silent, replace(first, cpu_s=2.5), first])
     table = pq.read_table(pa.BufferReader(whole.content))
     assert table["cell"].to_pylist() == [0, 0, 1, 1, 2, 2, 3, 3, 4]
     assert (whole.name, whole.runs, whole.failed, whole.crashed) == ("whole", 9, 4, 2)
-    assert undone_of(table) == {"tracker": {"it never had a track": (2, 8)}}
+    assert failure_counts_of_part(table) == {"tracker": {"it never had a track": (2, 8)}}
     assert whole.cpu_s == 2.5

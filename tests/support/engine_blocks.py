@@ -27,7 +27,7 @@ class Beat(Message):
     seen: np.ndarray = column("", "", "how many were seen", "int64", of=PER_ROW)
 
     @classmethod
-    def initial(cls, values):
+    def make_initial(cls, values):
         if set(values) != {"value"}:
             raise ValueError("needs value and nothing else")
         return beat(np.zeros(1, dtype=np.int64), np.array([float(values["value"])]))

@@ -148,7 +148,7 @@ def test_the_geometric_heights_that_are_sent_beside_know_no_weather():
     # Who sends none is not placed.
     simulation, rows = crowd(None)
     assert len(rows["target"]) == 0
-    (counts,) = [n for what, n in simulation.components["sensor"].undone().items()
+    (counts,) = [n for what, n in simulation.components["sensor"].failure_counts().items()
                  if "no altitude that it takes" in what]  # fmt: skip
     assert counts[0].sum() > 300
 

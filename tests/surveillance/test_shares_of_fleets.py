@@ -9,7 +9,7 @@ import pytest
 
 import dsa_des
 from components.aircraft.aircraft import Aircraft, Roster
-from components.aircraft.equipage import AdsBEquipage, EquipageShares, with_shares
+from components.aircraft.equipage import AdsBEquipage, EquipageShares, draw_equipage
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Stream
@@ -46,7 +46,7 @@ def rosters(tmp_path, traffic, share=0.4, seeds=(1,)):
 def test_each_keeps_its_equipage_by_itself():
     names = [f"a{number}" for number in range(20_000)]
     shares = EquipageShares(mode_s=0.8, mode_c=0.3, ads_b=0.5)
-    kept = with_shares(names, [FULL] * len(names), shares, Stream(1, "traffic", "equipage"))
+    kept = draw_equipage(names, [FULL] * len(names), shares, Stream(1, "traffic", "equipage"))
     found = Roster.from_pairs(list(zip(names, kept, strict=True))).equipage
     assert len({id(one) for one in kept}) == 8
     z = NormalDist().inv_cdf(0.9995)

@@ -15,8 +15,8 @@ from components.flights.bounds import _place, check_above_terrain, check_on_rast
 from components.terrain.raster import ElevationRaster, mosaic, read_raster
 from components.terrain.rays import (
     bent_elevation_rad,
-    dip_rad,
     geodetic_of,
+    horizon_dip_rad,
     is_behind_limb,
     is_behind_terrain,
     miss_bound_m,
@@ -108,9 +108,13 @@ def test_bending_and_dip():
     el, range_m = 0.02, 60e3
     rises = math.tan(bent_elevation_rad(el, range_m)) - math.tan(el)
     assert rises * range_m == pytest.approx(range_m**2 / (8 * R), rel=2e-3)
-    assert math.degrees(dip_rad(1000.0)) == pytest.approx(math.degrees(math.acos(R / (R + 1e3))))
-    assert dip_rad(1000.0, "four_thirds") == pytest.approx(math.acos(R / (R + 750.0)), rel=1e-4)
-    assert dip_rad(-5.0) == 0.0
+    assert math.degrees(horizon_dip_rad(1000.0)) == pytest.approx(
+        math.degrees(math.acos(R / (R + 1e3)))
+    )
+    assert horizon_dip_rad(1000.0, "four_thirds") == pytest.approx(
+        math.acos(R / (R + 750.0)), rel=1e-4
+    )
+    assert horizon_dip_rad(-5.0) == 0.0
     with pytest.raises(ValueError, match="refraction is 'air'"):
         bent_elevation_rad(0.0, 1.0, "air")
 

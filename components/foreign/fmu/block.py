@@ -164,7 +164,7 @@ class ForeignFmu(Component):
         said = self.p.step_that_does_not_fit()
         return [] if said is None else [said]
 
-    def undone(self) -> dict[str, tuple[int, int]]:
+    def failure_counts(self) -> dict[str, tuple[int, int]]:
         """Return how often its inputs had nothing from where they are read."""
         found: dict[str, tuple[int, int]] = {}
         lacks = zip(self.p.wiring.sources, self._unfed.tolist(), strict=True)

@@ -163,7 +163,7 @@ class DetectionOutputs:
         return "range_rate_m_s" in self._columns and "own_velocity_north_m_s" not in self._columns
 
     def offer(self, clock: ClockSpec | None) -> SensorOffer:
-        """Return what the sensor says of itself."""
+        """Return the sensor's declaration of what it measures."""
         same: dict[str, Any] = {}
         for error, variance in _ERRORS.items():
             stated, rooted = self._columns.get(variance), self._columns.get(error)

@@ -42,7 +42,7 @@ def message_column(message: Any, column: str, which: str | None, key: str) -> Fl
         if (
             values.ndim == 1
             and len(values) == rows
-            and not (entries and _per_entry(message, column))
+            and not (entries and _is_per_entry(message, column))
         ):
             return values.astype(np.float64)
         raise ValueError(f"{key}: {column!r} has a value for each target: say {column}[TARGET]")
@@ -66,7 +66,7 @@ def _is_numbers(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.dtype.kind in "biuf"
 
 
-def _per_entry(message: Any, column: str) -> bool:
+def _is_per_entry(message: Any, column: str) -> bool:
     found = next(item for item in fields(message) if item.name == column)
     return found.metadata.get("per") == "entry"
 

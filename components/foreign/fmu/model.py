@@ -142,7 +142,7 @@ class FmuModel:
 
 @read_once(64)
 def read_fmu(path: Path) -> FmuModel:
-    """Return what an FMU says of itself.
+    """Return the model description of an FMU.
 
     Raises
     ------

@@ -100,12 +100,12 @@ class FmuParameters(Parameters):
         self._wiring = wiring
         return self
 
-    def without_effect(self) -> list[str]:
+    def ineffective_key_notes(self) -> list[str]:
         """Return a sentence for each key that has no effect."""
         starred = any(source.endswith("[*]") for source in self.inputs.values())
         if self.detections or starred:
             return []
-        return self.idle("targets", because="without detections and inputs of [*]")
+        return self.note_ineffective("targets", because="without detections and inputs of [*]")
 
     def clock_spec(self) -> ClockSpec | None:
         """Return when it communicates, if that does not follow from what arrives."""

@@ -98,7 +98,7 @@ class FmuProcess:
         finally:
             watch.stop()
         if len(head) < 8 or len(content) < size:
-            raise self._ended_error(watch, deadline_s)
+            raise self._make_end_error(watch, deadline_s)
         answer: dict[str, Any] = pickle.loads(content)
         if "failed" in answer:
             words = self._last_words()
@@ -110,7 +110,7 @@ class FmuProcess:
             raise error
         return answer
 
-    def _ended_error(self, watch: "_Watch", deadline_s: float) -> FmuError:
+    def _make_end_error(self, watch: "_Watch", deadline_s: float) -> FmuError:
         self._process.kill()
         code = self._process.wait()
         words = self._last_words()

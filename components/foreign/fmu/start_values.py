@@ -54,7 +54,7 @@ def start_value(model: FmuModel, start: Mapping[str, Any], name: str) -> StartVa
     if len(values) != size:
         raise ValueError(f"{name!r} has {len(values)} values where it needs {size}")
     structural = variable.causality == "structuralParameter"
-    typed = [_to_type(model, variable, one) for one in values]
+    typed = [_convert_value(model, variable, one) for one in values]
     return StartValue(variable.kind, variable.reference, typed, structural)
 
 
@@ -67,7 +67,7 @@ def first_inputs(model: FmuModel, start: Mapping[str, Any], variable: Variable) 
     return numbers if len(numbers) == size else [numbers[0] if numbers else 0.0] * size
 
 
-def _to_type(model: FmuModel, variable: Variable, value: Any) -> Any:
+def _convert_value(model: FmuModel, variable: Variable, value: Any) -> Any:
     kind, said = variable.kind, f"{variable.name!r} is {value!r}"
     if kind in TEXT_KINDS:
         return _text(kind, said, value)

@@ -147,7 +147,7 @@ class Wiring:
                 given |= {v: f"{block}.{member}{tail}" for member, v in inputs.items()}
         groups: dict[str, list[Variable]] = {}
         parsed: list[tuple[Variable, int, str]] = []
-        for name, source in self._of_each_target(given):
+        for name, source in self._expand_targets(given):
             try:
                 variable, place = self._input(name)
             except ValueError as error:
@@ -179,7 +179,7 @@ class Wiring:
             variable.variability != "continuous" for group in groups.values() for variable in group
         )
 
-    def _of_each_target(self, given: Mapping[str, str]) -> list[tuple[str, str]]:
+    def _expand_targets(self, given: Mapping[str, str]) -> list[tuple[str, str]]:
         """Return the inputs with their sources; one of ``BLOCK.COLUMN[*]`` is one of each target.
 
         Of an array these are its elements, of ``plane[*].range`` the inputs of that number.
@@ -256,7 +256,7 @@ class Wiring:
     # -- what the FMU's process needs to know --------------------------------------------------
 
     def spec(self, name: str, ticks_per_s: int, *, rewinds: bool) -> dict[str, Any]:
-        """Return what the FMU's process needs to know.
+        """Return the specification of the wiring for the FMU's process.
 
         Raises
         ------

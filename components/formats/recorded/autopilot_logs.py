@@ -148,13 +148,13 @@ def _reports_heard_by_px4(
         time, address, lat, lon, kind, alt, heading, fast, climb, flags, age = row
         text = "".join(chr(letter & 127) for letter in letters[k])
         heard_at_s = time / 1e6 + offset_s - age
-        yield _of_transponder(
+        yield _transponder_report(
             callsigns, int(address), text, heard_at_s, lat, lon, kind, alt,
             math.degrees(heading), fast, climb, int(flags),
         )  # fmt: skip
 
 
-def _of_transponder(
+def _transponder_report(
     callsigns: dict[str, str], address: int, callsign: str, time_s: float, lat: float, lon: float,
     kind: float, alt: float, heading: float, fast: float, climb: float, flags: int,
 ) -> PositionReport:  # fmt: skip
@@ -231,7 +231,7 @@ def tlog_log(problems: Problems, data: bytes, stem: str) -> Log:
     frames = _frames(data, lost)
 
     def each() -> Iterator[tuple[int, PositionReport]]:
-        yield from _of_frames(problems, frames, stem, callsigns)
+        yield from _read_frames(problems, frames, stem, callsigns)
         if lost:
             what = "frame is" if len(lost) == 1 else "frames are"
             warnings.append(f"{len(lost)} {what} damaged and left out")
@@ -277,7 +277,7 @@ def _frames(data: bytes, lost: list[int]) -> Iterator[tuple[int, _Frame]]:
         at = end
 
 
-def _of_frames(
+def _read_frames(
     problems: Problems, frames: Iterator[tuple[int, _Frame]], stem: str,
     callsigns: dict[str, str],
 ) -> Iterator[tuple[int, PositionReport]]:  # fmt: skip
@@ -310,7 +310,7 @@ def _of_frames(
             )  # fmt: skip
         else:
             (address, lat, lon, alt, heading, fast, climb, flags, _, kind, text, _, age) = values
-            report = _of_transponder(
+            report = _transponder_report(
                 callsigns, address, text.decode("latin-1"), frame.time_s - age, lat * 1e-7,
                 lon * 1e-7, kind, alt * 1e-3, heading / 100.0, fast / 100.0, climb / 100.0, flags,
             )  # fmt: skip

@@ -35,7 +35,7 @@ def is_capture(data: bytes) -> bool:
 def udp_payloads(problems: Problems, data: bytes) -> list[tuple[float, bytes]]:
     """Return when each datagram was captured, and what it holds; TrafficFileError if none."""
     problems.of = "packet"
-    packets = _of_pcap(problems, data) if data[:4] in _PCAP else _of_pcapng(problems, data)
+    packets = _read_pcap(problems, data) if data[:4] in _PCAP else _read_pcapng(problems, data)
     found, links = [], set()
     for packet in packets:
         links.add(packet.link)
@@ -51,7 +51,7 @@ def udp_payloads(problems: Problems, data: bytes) -> list[tuple[float, bytes]]:
     return found
 
 
-def _of_pcap(problems: Problems, data: bytes) -> Iterator[Packet]:
+def _read_pcap(problems: Problems, data: bytes) -> Iterator[Packet]:
     order, fraction_s = _PCAP[data[:4]]
     if len(data) < 24:
         problems.fail("the capture is cut off in its header")
@@ -69,7 +69,7 @@ def _of_pcap(problems: Problems, data: bytes) -> Iterator[Packet]:
         at += size
 
 
-def _of_pcapng(problems: Problems, data: bytes) -> Iterator[Packet]:
+def _read_pcapng(problems: Problems, data: bytes) -> Iterator[Packet]:
     order = "<"
     interfaces: list[tuple[int, float]] = []
     at, number = 0, 0

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from itertools import islice
 
 from components.formats.reports import Log, PositionReport
-from components.formats.text_rows import Problems, each_line, text_of
+from components.formats.text_rows import Problems, iterate_lines, text_of
 
 _DATE = re.compile(r"HFDTE(?:DATE)?:?\s*(\d\d)(\d\d)(\d\d)", re.IGNORECASE)
 _FIX = re.compile(
@@ -35,7 +35,7 @@ def igc_log(problems: Problems, data: bytes, stem: str) -> Log:
 
 def _name(text: str) -> str:
     for pattern in _NAMES:
-        for _, line in islice(each_line(text), 200):
+        for _, line in islice(iterate_lines(text), 200):
             if (match := pattern.match(line)) and match[1].strip().lower() not in _NAMELESS:
                 return match[1].strip()
     return ""
@@ -48,8 +48,8 @@ def _fixes(
     damaged: list[int] = []
     last_s = -1
     more: dict[str, slice] = {}
-    pressed = any(one[25:30].strip("0") for _, one in each_line(text) if _FIX.match(one))
-    for number, line in each_line(text):
+    pressed = any(one[25:30].strip("0") for _, one in iterate_lines(text) if _FIX.match(one))
+    for number, line in iterate_lines(text):
         if match := _DATE.match(line):
             try:
                 day = datetime(2000 + int(match[3]), int(match[2]), int(match[1]), tzinfo=UTC)

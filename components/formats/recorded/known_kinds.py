@@ -18,7 +18,7 @@ from components.formats.recorded.igc_file import igc_log, is_igc
 from components.formats.recorded.json_records import is_json, record_json
 from components.formats.recorded.xml_tracks import xml_log
 from components.formats.recording import Recording
-from components.formats.reports import Log, recording_of
+from components.formats.reports import Log, build_recording
 from components.formats.sample_columns import Altitude
 from components.formats.text_rows import (
     ALL_TOKENS,
@@ -26,7 +26,7 @@ from components.formats.text_rows import (
     Problems,
     TrafficFileError,
     clean_token,
-    each_line,
+    iterate_lines,
     read_content,
     text_of,
     tokens,
@@ -82,22 +82,22 @@ def record(
     data = _unzip(problems, read_content(path, problems))
     stem = re.sub(r"(\.\w{1,7}){1,2}$", "", path.name) or path.name
     if data.startswith(_PARQUET):
-        return _of_parquet(problems, data, altitude, stem)
+        return _read_parquet(problems, data, altitude, stem)
     if is_capture(data):
-        return _of_capture(problems, data, altitude, place)
+        return _read_capture(problems, data, altitude, place)
     if path.suffix.lower() == ".ast" or _is_asterix(data):
         return record_asterix(problems, data, altitude, place=place)
     log = _log_of(problems, data, stem)
     if log is not None:
         del data  # its reader holds what it needs of it
-        return recording_of(problems, log, None, altitude)
+        return build_recording(problems, log, None, altitude)
     if is_json(data):
         return record_json(problems, data, None, altitude, stem)
     for begins, said in _OTHERS:
         if data.startswith(begins):
             problems.fail(f"{said}; what is read: {KINDS}")
     text = text_of(data, problems, f"a file of a known kind ({KINDS})")
-    lines, is_daa = each_line(text), _is_daa(text)
+    lines, is_daa = iterate_lines(text), _is_daa(text)
     del data, text  # the lines hold it while there are more
     if path.suffix.lower() in (".daa", ".xyz") or is_daa:
         return record_daa(problems, lines, place or (0.0, 0.0, 0.0))
@@ -199,7 +199,7 @@ def _is_readable(path: Path, data: bytes) -> bool:
     return True
 
 
-def _of_capture(
+def _read_capture(
     problems: Problems, data: bytes, altitude: Altitude | None,
     place: tuple[float, float, float] | None,
 ) -> Recording:  # fmt: skip
@@ -215,7 +215,7 @@ def _of_capture(
 
 def _is_daa(text: str) -> bool:
     """Return whether a table has a row of units or local offsets, as DAIDALUS's do."""
-    lines = (one for one in each_line(text) if not one[1].startswith("#"))
+    lines = (one for one in iterate_lines(text) if not one[1].startswith("#"))
     names = [token.lower() for token in tokens(next(lines, (0, ""))[1])]
     units = tokens(next(lines, (0, ""))[1])
     if {"sx", "sy", "sz"} <= {*names}:
@@ -230,7 +230,9 @@ def _is_daa(text: str) -> bool:
 _BATCH = 16_384
 
 
-def _of_parquet(problems: Problems, data: bytes, altitude: Altitude | None, stem: str) -> Recording:
+def _read_parquet(
+    problems: Problems, data: bytes, altitude: Altitude | None, stem: str
+) -> Recording:
     """Return the aircraft of a Parquet table, which has the columns of a CSV table."""
     import pyarrow as pa
     import pyarrow.compute as pc

@@ -97,7 +97,7 @@ def drop_aircraft(recording: Recording, names: Collection[str]) -> Recording:
     return replace(recording, samples={n: c for n, c in recording.samples.items() if n not in gone})
 
 
-def with_ownship(recording: Recording, own: str) -> Recording:
+def choose_ownship(recording: Recording, own: str) -> Recording:
     """Return a recording whose ownship is another aircraft of it."""
     first = {own: recording.samples[own]}
     return replace(recording, samples=first | recording.samples)

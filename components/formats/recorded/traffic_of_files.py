@@ -11,13 +11,13 @@ import numpy as np
 
 from components.formats.recorded.known_kinds import record
 from components.formats.recorded.selection import (
+    choose_ownship,
     cut_to_space,
     cut_to_time,
     drop_aircraft,
     find_aircraft,
     join_recordings,
     move_flight,
-    with_ownship,
 )
 from components.formats.recording import Recording, Samples
 from components.formats.sample_columns import EPOCH_S, Altitude
@@ -130,7 +130,7 @@ def _ownship_samples(whole: Recording, choice: TrafficChoice, start_s: float) ->
         own = next(iter(whole.samples)) if choice.ownship is None else find_aircraft(
             whole.problems, whole, choice.ownship
         )  # fmt: skip
-        whole.samples = with_ownship(whole, own).samples
+        whole.samples = choose_ownship(whole, own).samples
         called, columns = own, whole.samples[own]
     else:
         flight = _record(choice.own_file, choice)

@@ -19,11 +19,11 @@ def xml_log(problems: Problems, data: bytes, stem: str) -> Log | None:
     problems.of = "point"
     head = data[:4096].lower()
     if b"<gpx" in head:
-        points = _points(problems, _of_gpx(problems, data, stem))
+        points = _points(problems, _read_gpx(problems, data, stem))
         return Log("GPX tracks", "m", points, {}, "points", geometric=ABOVE_SEA)
     if b"<kml" in head or (b"<document" in head and b"<placemark" in data.lower()):
         warnings: list[str] = []
-        points = _points(problems, _of_kml(problems, data, stem, warnings))
+        points = _points(problems, _read_kml(problems, data, stem, warnings))
         return Log("KML tracks", "m", points, {}, "points", warnings, ABOVE_SEA)
     return None
 
@@ -101,7 +101,7 @@ def _elements(
         problems.fail(f"is no XML that can be read: {error}")
 
 
-def _of_gpx(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
+def _read_gpx(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
     name = ele = when = ""
     names: dict[str, int] = {}
     place: dict[str, str] = {}
@@ -124,7 +124,7 @@ def _of_gpx(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
             ele, when = (text, when) if tag == "ele" else (ele, text)
 
 
-def _of_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -> Iterator[_Point]:
+def _read_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -> Iterator[_Point]:
     """Yield the points of tracks, and those of placemarks with a time each."""
     names: dict[int, str] = {}
     tracks: dict[str, int] = {}

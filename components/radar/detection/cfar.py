@@ -71,7 +71,7 @@ def cfar_detection_probability(
 def cfar_multiplier(
     reference_cells: int, false_alarm_probability: float, *, pulses: int = 1
 ) -> float:
-    """Return what the sum of the reference cells is multiplied by to give the threshold.
+    """Return the factor from the sum of the reference cells to the threshold.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ class Averaging:
         return cfar_required_snr(pd, model=model, **self._settings)
 
     def loss_db(self, pd: float, model: str) -> float:
-        """Return what the SNR must be more for Pd `pd` than with a known threshold, dB."""
+        """Return the additional SNR for Pd `pd` over that with a known threshold, dB."""
         return cfar_loss_db(pd, model=model, **self._settings)
 
 

@@ -174,12 +174,16 @@ def clutter_detection_probability(
     powers = (target[cluttered] / over, mean[cluttered] / over, noise / over)
     cell = (*powers, level, _ANY_THRESHOLD if rises else 0.0)
     with np.errstate(under="ignore"):  # vanishing probabilities are 0
-        probability = _fluctuating(name, *cell) if kind == "fluctuating" else _constant(name, *cell)
+        probability = (
+            _pd_in_fluctuating_clutter(name, *cell)
+            if kind == "fluctuating"
+            else _pd_in_constant_clutter(name, *cell)
+        )
     result[cluttered] = np.minimum(np.maximum(probability, 0.0), 1.0)
     return unflatten(result, shape)
 
 
-def _fluctuating(
+def _pd_in_fluctuating_clutter(
     model: str, target: FloatArray, mean: FloatArray, noise: FloatArray, v: float, most: float
 ) -> FloatArray:
     noise = noise + mean
@@ -192,12 +196,12 @@ def _fluctuating(
     return np.exp(-v / total) * (1.0 + (v / total) * (0.5 * target / total))
 
 
-def _constant(
+def _pd_in_constant_clutter(
     model: str, target: FloatArray, mean: FloatArray, noise: FloatArray, v: float, most: float
 ) -> FloatArray:
     largest = max(v, most)
     if model == "swerling0":
-        return _over_phases(target, mean, noise, v, largest)
+        return _integrate_phases(target, mean, noise, v, largest)
     if model in ("swerling1", "swerling2"):
         total = noise + target
         return marcum_q1(mean / total, v / total, largest)
@@ -215,7 +219,7 @@ def _slope(c: FloatArray, w: FloatArray) -> FloatArray:
     return np.exp(-((root_c - root_w) ** 2)) * (w * i0e(x) - root_c * root_w * i1e(x))
 
 
-def _over_phases(
+def _integrate_phases(
     target: FloatArray, mean: FloatArray, noise: FloatArray, v: float, largest: float
 ) -> FloatArray:
     s, c = np.sqrt(target), np.sqrt(mean)

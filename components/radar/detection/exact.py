@@ -38,7 +38,7 @@ _NEGLIGIBLE = 1e-18
 
 def geometric_gain(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArray:
     """Return Pd for K = 1 or 2; `echo` is n·SNR (flat array)."""
-    q, r = _odds(echo / shape)
+    q, r = _echo_and_noise_shares(echo / shape)
     term = noise.term[: _count_noise_terms(noise)]
     total = _polynomial(term, q)
     if shape == 2:
@@ -49,14 +49,14 @@ def geometric_gain(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArra
 
 def geometric_miss(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArray:
     """Return 1 - Pd for K = 1 or 2; `echo` is n·SNR (flat array)."""
-    q, r = _odds(echo / shape)
+    q, r = _echo_and_noise_shares(echo / shape)
     missed = noise.missed[: _count_noise_terms(noise)]
     if shape == 2:
         return _polynomial(missed * np.arange(1.0, missed.size + 1.0), q) * r * r
     return _polynomial(missed, q) * r
 
 
-def _odds(scale: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _echo_and_noise_shares(scale: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return q = c/(1+c) and 1 - q, both to full accuracy, for c from 0 to infinity."""
     r = 1.0 / (1.0 + scale)
     return np.where(scale < 1.0, np.minimum(scale, 1.0) * r, 1.0 - r), r
@@ -126,7 +126,7 @@ def _chain(
         z = echo
         first = poisson(anchor, echo)
     else:
-        z, _ = _odds(echo / shape)
+        z, _ = _echo_and_noise_shares(echo / shape)
         first = negative_binomial(anchor, float(shape), echo / shape)
     # The largest term times the number of terms bounds the sum.
     work = np.flatnonzero(first * weight[whole] * (high - low + 1) > negligible)
@@ -147,7 +147,7 @@ def _anchor(noise: NoiseTerms, shape: int | None, echo: FloatArray) -> FloatArra
         peak = 2.0 * echo * v / (n + np.sqrt(n * n + 4.0 * echo * v))
     else:
         # q (j+K)/(j+1) · V/(n+j+1) = 1
-        q, _ = _odds(echo / shape)
+        q, _ = _echo_and_noise_shares(echo / shape)
         slope = n + 2.0 - q * v
         constant = n + 1.0 - q * v * shape
         root = np.sqrt(np.maximum(slope * slope - 4.0 * constant, 0.0))

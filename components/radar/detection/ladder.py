@@ -145,7 +145,7 @@ class ExactDetection(Effect[str]):
             return Verdict(False, f"detection is {block.p.detection!r}")
         if block.p.cfar_reference_cells is not None:
             return Verdict(True, "with CFAR there is no other")
-        if closed_form(block):
+        if has_closed_form(block):
             return Verdict(True, "with 1 pulse and Swerling I or II it is a closed form")
         bound = {"detection_probability": TABLE_ERROR}
         return Verdict(True, "detection is 'exact'", bound)
@@ -155,7 +155,7 @@ class ExactDetection(Effect[str]):
         return "exact"
 
 
-def closed_form(block: Any) -> bool:
+def has_closed_form(block: Any) -> bool:
     """Return whether the exact Pd of all targets is a single power, cheaper than any rung."""
     return block.p.pulses_summed == 1 and _models(block) <= {1, 2}
 
@@ -165,7 +165,7 @@ def method_reasons(block: Any, method: str) -> list[str]:
     allowed = block.context.sections["accuracy"].detection_probability
     if method == "table":
         said = f"table, its error is at most {TABLE_ERROR:g} and [accuracy] allows {allowed:g}"
-    elif closed_form(block):
+    elif has_closed_form(block):
         said = "exact, with 1 pulse and Swerling I or II a closed form and the cheapest"
     elif block.context.simulate_everything:
         said = "exact, the reference: everything is simulated"

@@ -64,13 +64,13 @@ def test_the_plane_and_the_flights_give_the_same(
     (tmp_path / "scene.toml").write_text(scene, encoding="utf-8")
     (tmp_path / "study.toml").write_text(STUDY.format(size=670.56), encoding="utf-8")
     asked: list[int] = []
-    exact = risk_metric.RiskRatios._of_nominal
+    exact = risk_metric.RiskRatios._nominal_events
 
     def counted(self: Any, group: Any) -> Any:
         asked.append(len(group))
         return exact(self, group)
 
-    monkeypatch.setattr(risk_metric.RiskRatios, "_of_nominal", counted)
+    monkeypatch.setattr(risk_metric.RiskRatios, "_nominal_events", counted)
     in_plane = foreseen(tmp_path)
     assert sum(asked) < 60, "few are asked of the flights"
     monkeypatch.setattr(risk_metric, "meetings_in_plane", lambda *_: None)

@@ -310,7 +310,7 @@ def test_an_input_that_nothing_comes_to_is_counted(eye, range_km, times):
     }  # fmt: skip
     found["blocks"]["eye"]["inputs"]["range_in"] = "radar.range_m[*]"
     found["wires"] += ["gate -> radar", "radar -> eye"]
-    counted = Simulation(dsa_des.load_scene(found)).run().undone["eye"]
+    counted = Simulation(dsa_des.load_scene(found)).run().failure_counts["eye"]
     what = "inputs.range_in has had nothing from radar and keeps its start value"
     assert counted.pop(what) == (times, 10)
     assert list(counted.values()) == [(0, 10), (0, 10)]

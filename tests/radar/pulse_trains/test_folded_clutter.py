@@ -14,7 +14,7 @@ from wired import HEARS_ALL, chain, run, sensor
 
 import dsa_des
 from components.radar.ground_clutter import altitude_line_rcs_m2
-from components.radar.rain import other_ranges_m
+from components.radar.rain import ambiguous_ranges_m
 from dsa_des.errors import SceneError
 from dsa_des.running.simulation import Simulation
 
@@ -159,7 +159,7 @@ def test_rain_of_other_pulses_is_heard_too():
 
 
 def test_other_ranges_are_every_fold_but_the_own():
-    found = list(other_ranges_m(np.array([2500.0, 40.0, 1000.0]), 1000.0, 3600.0))
+    found = list(ambiguous_ranges_m(np.array([2500.0, 40.0, 1000.0]), 1000.0, 3600.0))
     assert np.array(found).tolist() == [
         [500.0, np.inf, np.inf], [1500.0, 1040.0, np.inf], [np.inf, 2040.0, 2000.0],
         [3500.0, 3040.0, 3000.0],

@@ -110,7 +110,7 @@ VIEW = {
 def test_explain_says_where_noise_is_reported_exactly_at_the_target(keys, said):
     radar = sensor("radar.swerling", **keys)
     simulation = Simulation(dsa_des.load_scene(chain({"radar": radar})))
-    lines = simulation.components["radar"].left_out()
+    lines = simulation.components["radar"].skipped_work_notes()
     assert any("reported exactly where the target is" in line for line in lines) is said
 
 

@@ -82,10 +82,12 @@ def test_who_is_where_the_track_should_be_but_flies_the_other_way_is_not_in_its_
 def test_rates_that_cannot_be_weighed_are_left_out_and_explained(keys, tracker, why):
     given = scene(radar={**RADAR, **keys}, **tracker)
     block = Simulation(dsa_des.load_scene(given)).components["tracker"]
-    assert [said.startswith(f"range rates of radar: {why}") for said in block.left_out()] == [True]
+    assert [
+        said.startswith(f"range rates of radar: {why}") for said in block.skipped_work_notes()
+    ] == [True]
     (row,) = rows(run(given), "state_tracks")
     assert row["north_m_s"] == row["east_m_s"] == row["down_m_s"] == 0.0
-    assert Simulation(dsa_des.load_scene(scene())).components["tracker"].left_out() == []
+    assert Simulation(dsa_des.load_scene(scene())).components["tracker"].skipped_work_notes() == []
 
 
 def test_only_rates_of_who_may_tell_them_are_used():

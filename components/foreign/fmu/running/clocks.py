@@ -43,7 +43,7 @@ class Clocks:
                     found[number] = min(later)
         return found
 
-    def ticking(self, after: int, at: int) -> list[int]:
+    def pop_ticking_clocks(self, after: int, at: int) -> list[int]:
         """Return the clocks that tick after one instant up to another; they no longer wait to."""
         due = [number for number, tick in self.next_ticks(after).items() if tick <= at]
         self.pending = {number: tick for number, tick in self.pending.items() if tick > at}

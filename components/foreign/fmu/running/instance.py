@@ -106,7 +106,7 @@ class Instance:
         self.log.append(message.decode(errors="replace").strip())
 
     def words(self) -> str:
-        """Return what it logged last, to be added to an error."""
+        """Return the FMU's last log messages, to be added to an error."""
         return f": {' | '.join(list(self.log)[-3:])}" if self.log else ""
 
     def refuse(self, call: str, status: int) -> None:
@@ -236,7 +236,7 @@ class Instance:
                 return False
             if at == tick or self.ended:
                 return at == tick
-            due = self.clocks.ticking(before, at)
+            due = self.clocks.pop_ticking_clocks(before, at)
             self._exchange(None, due, at, per_s, raised)
             before = at
 
@@ -302,14 +302,18 @@ class Instance:
                 if scheduled:
                     self.clocks.count_down(tick, per_s)
                 elif self.spec["events"]:
-                    due_now = [*due[row], *self.clocks.ticking(tick - 1, tick)] if clocked else ()
+                    due_now = (
+                        [*due[row], *self.clocks.pop_ticking_clocks(tick - 1, tick)]
+                        if clocked
+                        else ()
+                    )
                     self._events(None, due_now, raised[row])
                     self._leave_event_mode(tick, per_s)
             elif clocked:
                 if not self._step_to(self.tick, tick, per_s, raised[row]):
                     done = row
                     break
-                now_due = [*due[row], *self.clocks.ticking(tick - 1, tick)]
+                now_due = [*due[row], *self.clocks.pop_ticking_clocks(tick - 1, tick)]
                 self._exchange(rows[row] if changed[row] else None, now_due, tick, per_s,
                                raised[row])  # fmt: skip
             elif not scheduled:

@@ -10,9 +10,9 @@ from dsa_des.arrays.run_ticks import is_single_run
 from dsa_des.arrays.types import BoolArray, IntArray
 
 #: By block and by what its work lacked: how many times, of how many.
-Undone = Mapping[str, Mapping[str, tuple[int, int]]]
+FailureCounts = Mapping[str, Mapping[str, tuple[int, int]]]
 #: The same for each run: both counts, (2, runs).
-UndoneByRun = Mapping[str, Mapping[str, IntArray]]
+FailuresByRun = Mapping[str, Mapping[str, IntArray]]
 #: No case of any run, and no counts of any.
 NO_RUNS: IntArray = np.empty(0, dtype=np.int64)
 NO_COUNTS: IntArray = np.zeros((2, 0), dtype=np.int64)
@@ -22,7 +22,7 @@ SECONDS_FAILED = "seconds failed"
 _LEAST_SHARE = 0.1
 
 
-def add_counts(parts: Iterable[Undone]) -> dict[str, dict[str, tuple[int, int]]]:
+def add_counts(parts: Iterable[FailureCounts]) -> dict[str, dict[str, tuple[int, int]]]:
     """Return the counts of several runs as those of all of them, sorted."""
     result: dict[str, dict[str, tuple[int, int]]] = {}
     for part in parts:
@@ -38,7 +38,7 @@ def add_counts(parts: Iterable[Undone]) -> dict[str, dict[str, tuple[int, int]]]
     }
 
 
-def with_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
+def count_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
     """Return counts (2, runs) with more cases: the run of each that lacked something, and of all.
 
     The counts may end before the last run.
@@ -54,22 +54,22 @@ def with_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
 
 
 def counts_by_run(
-    undone: Mapping[str, IntArray | tuple[int, int]], runs: int
+    failures: Mapping[str, IntArray | tuple[int, int]], runs: int
 ) -> dict[str, IntArray]:
-    """Return a block's answer (`Component.undone`) as counts of all runs."""
+    """Return a block's answer (`Component.failure_counts`) as counts of all runs."""
     result: dict[str, IntArray] = {}
-    for what, counts in undone.items():
+    for what, counts in failures.items():
         said = np.asarray(counts, dtype=np.int64).reshape(2, -1)
         result[what] = np.zeros((2, runs), dtype=np.int64)
         result[what][:, : said.shape[1]] = said
     return result
 
 
-def sum_runs(undone: UndoneByRun, runs: Collection[int] | slice) -> Undone:
+def sum_runs(failures: FailuresByRun, runs: Collection[int] | slice) -> FailureCounts:
     """Return the counts of some runs together."""
     some = runs if isinstance(runs, slice) else list(runs)
     result: dict[str, dict[str, tuple[int, int]]] = {}
-    for block, counts in undone.items():
+    for block, counts in failures.items():
         for what, of_each in counts.items():
             times, of = of_each[:, some].sum(axis=1).tolist()
             if of:
@@ -77,11 +77,11 @@ def sum_runs(undone: UndoneByRun, runs: Collection[int] | slice) -> Undone:
     return add_counts([result])
 
 
-def undone_sentences(undone: Undone) -> list[str]:
+def failure_sentences(failures: FailureCounts) -> list[str]:
     """Say what blocks could not do, with its share, where that is more than now and then."""
     return [
         f"{block}: {what}: {times:,} of {of:,} ({_percent(times / of)})"
-        for block, counts in undone.items()
+        for block, counts in failures.items()
         for what, (times, of) in counts.items()
         if times > 0 and (what == SECONDS_FAILED or times >= _LEAST_SHARE * of)
     ]
@@ -113,7 +113,7 @@ class Tries:
         done[mine] |= np.logical_or.reduceat(did, first)
         return Tries(every, done)
 
-    def undone(self, what: str, *, of_two: bool = False) -> dict[str, IntArray]:
+    def failure_counts(self, what: str, *, of_two: bool = False) -> dict[str, IntArray]:
         """Return in which runs it was never done, of those that had a source, or two."""
         enough = has_two_bits(self.had) if of_two else self.had != 0
         return {what: np.array([enough & ~self.did, enough], dtype=np.int64)}
