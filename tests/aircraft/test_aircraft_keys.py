@@ -414,7 +414,7 @@ def test_transponders(carrier, tmp_path):
         assert seen.keys() == {"asker"} and seen["asker"]["address"] == address
 
 
-@covers("ads_b.nic", "ads_b.silent_after_s", of=FULLY)
+@covers("ads_b.nic", "ads_b.gva", "ads_b.silent_after_s", of=FULLY)
 @covers("ads_b.spoofed_north_m", "ads_b.spoofed_east_m", "ads_b.spoofed_up_m", of=FULLY)
 @pytest.mark.parametrize("carrier", FULLY)
 def test_broadcasts(carrier, tmp_path):
@@ -425,6 +425,9 @@ def test_broadcasts(carrier, tmp_path):
 
     plain, other = said(), said(nic=5)
     assert (plain["nic"], other["nic"]) == (8, 5)
+    assert plain["reported_height_m"] is None
+    height_m = said(gva=2)["reported_height_m"]
+    assert height_m == pytest.approx(plain["reported_alt_m"], abs=45.0)
     assert said(silent_after_s=0.0) is None
     spoofed = said(spoofed_north_m=700.0, spoofed_east_m=-300.0, spoofed_up_m=120.0)
     moved = pymap3d.geodetic2ned(*(row[key] for row in (spoofed, plain) for key in places))
@@ -458,7 +461,7 @@ def test_quality_of_broadcasts(carrier, tmp_path):
 
 AREA_KEYS = tuple(f"{band}.{key}" for band, areas in (("eo", AREAS), ("ir", WARM)) for key in areas)
 BROADCAST_KEYS = (
-    "nic", "nacp", "nacv", "latency_s", "compensated_s", "silent_after_s",
+    "nic", "nacp", "nacv", "gva", "latency_s", "compensated_s", "silent_after_s",
     "spoofed_north_m", "spoofed_east_m", "spoofed_up_m",
 )  # fmt: skip
 
@@ -499,7 +502,7 @@ def told(carrier: str, folder) -> dict[str, float]:
 
 def transmitted(carrier: str, folder, **name: str) -> dict[str, float]:
     """What its broadcasts and replies come to; places from where it says that it is else."""
-    ads_b = {"nic": 5, "nacp": 9, "nacv": 1, "latency_s": 0.3, "compensated_s": 0.1,
+    ads_b = {"nic": 5, "nacp": 9, "nacv": 1, "gva": 2, "latency_s": 0.3, "compensated_s": 0.1,
              "spoofed_north_m": 700.0, "spoofed_east_m": -300.0, "spoofed_up_m": 120.0}  # fmt: skip
     places = ("reported_lat_deg", "reported_lon_deg", "reported_alt_m")
     plain, said = (
@@ -507,7 +510,10 @@ def transmitted(carrier: str, folder, **name: str) -> dict[str, float]:
         for keys in ({"nacp": 11, "nacv": 4}, ads_b)
     )
     assert heard(carrier, folder, {"ads_b": {"silent_after_s": 0.0}}) == {}
-    found = {key: said[key] for key in ("nic", "reported_north_m_s", "reported_east_m_s")}
+    found = {
+        key: said[key]
+        for key in ("nic", "reported_north_m_s", "reported_east_m_s", "reported_height_m")
+    }
     moved = pymap3d.geodetic2ned(*(row[key] for row in (said, plain) for key in places))
     for craft in ({"mode_s": True, "icao_address": "4840D6"}, {"mode_c": True}):
         found["address " + " ".join(craft)] = heard(carrier, folder, craft)["asker"]["address"]

@@ -247,7 +247,7 @@ def test_velocities_are_no_older_than_the_scene_says():
 EQUIPAGE = {
     "mode_s": True, "mode_c": True, "icao_address": "4840D6",
     **{f"ads_b.{key}": value for key, value in {
-        "nacp": 9, "nacv": 2, "nic": 7, "latency_s": 0.0, "compensated_s": 0.0,
+        "nacp": 9, "nacv": 2, "nic": 7, "gva": 2, "latency_s": 0.0, "compensated_s": 0.0,
         "silent_after_s": 9.0, "spoofed_north_m": 1.0, "spoofed_east_m": 1.0,
         "spoofed_up_m": 1.0}.items()},
 }  # fmt: skip

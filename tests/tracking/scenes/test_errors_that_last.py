@@ -136,7 +136,9 @@ def test_a_filter_that_is_told_nothing_of_it_warns():
 def test_looks_have_in_common_what_lies_between_them_whichever_was_first():
     """2 s apart, 0.02 rad across the line on which azimuths jump, in either order: 3 s is other."""
     told = []
-    lasting = SimpleNamespace(lasts=np.array([True]), common=lambda *given: told.append(given))
+    lasting = SimpleNamespace(
+        is_correlated=np.array([True]), common=lambda *given: told.append(given)
+    )
     rules = SimpleNamespace(lasting=lasting, ticks_per_s=10)
     part = SimpleNamespace(
         tick=np.array([40, 60, 30]), seen_tick=np.array([[60, 40, 60]]),
