@@ -249,7 +249,8 @@ def union_coverage(
     """Return the share of each pixel that two convex outlines cover together, over an exposure.
 
     `smear` is how far they move meanwhile (x, y), pixels, half before and half after; the mean of
-    so many exact pictures that the outline moves at most a quarter of a pixel between them.
+    so many exact pictures that the outline moves at most a quarter of a pixel between them, of 64
+    beyond 16 pixels.
     """
     one, other = outlines
     parts = ((1.0, one), (1.0, other), (-1.0, common_part(one, other)))

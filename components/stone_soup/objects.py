@@ -66,7 +66,7 @@ class Poses:
         return StateVector(self._angles[:, i])
 
     def model(self, i: int, variances: FloatArray) -> Any:
-        """Return what sensor i would measure of a state, and how well."""
+        """Return Stone Soup's measurement model of sensor i with noise of these variances."""
         common = {
             "ndim_state": self._size,
             "mapping": self._mapping,

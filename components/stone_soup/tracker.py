@@ -281,9 +281,9 @@ class StoneSoupTracker(Component):
         )  # fmt: skip
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return whose looks came too late."""
+        """Return how many looks came too late, of how many, by sensor."""
         return self._count.failure_counts()
 
     def report(self) -> dict[str, Any]:
-        """Return whose looks came too late."""
+        """Return how many looks came too late, by sensor."""
         return {"late_looks": {self.name: self._count.late()}}

@@ -318,7 +318,7 @@ class Lookout(Sensor):
         return result
 
     def _search_integral(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
-        """Return the integral of the rate since the last scan, or how many rounds it showed."""
+        """Return each search rate integrated since the last scan, or the rounds in that time."""
         before_s = self._since_last_scan_s(cells, which)
         if not len(which):
             return before_s

@@ -252,7 +252,7 @@ def _refuse_overlap(scene_file: SceneFile, one: TimedChange, other: TimedChange)
     if other.from_s < one.from_s:
         one, other = other, one
     for text, key in zip(other.values, other.keys, strict=True):
-        if not any(_is_at_or_in(key, mine) for mine in one.keys):
+        if not any(_is_either_in_other(key, mine) for mine in one.keys):
             continue
         inside = one.to_s is not None and other.from_s < one.to_s
         if inside or one.from_s == other.from_s:
@@ -264,8 +264,8 @@ def _refuse_overlap(scene_file: SceneFile, one: TimedChange, other: TimedChange)
             scene_file.report((CHANGES, other.number, "set", text), message)
 
 
-def _is_at_or_in(one: Key, other: Key) -> bool:
-    """Return whether one key is the other, or is in it."""
+def _is_either_in_other(one: Key, other: Key) -> bool:
+    """Return whether keys are equal, or either is inside the other."""
     shorter = min(len(one), len(other))
     return one[:shorter] == other[:shorter]
 

@@ -73,7 +73,7 @@ def _texts(error: Any) -> list[str]:
 
 
 def _fields_schema(schema: Any) -> Any:
-    """Return a model's schema without what is asked of it as a whole after its fields."""
+    """Return a model's pydantic core schema without its after-validators."""
     if schema["type"] == "function-after":
         return _fields_schema(schema["schema"])
     if schema["type"] == "definitions":

@@ -7,6 +7,7 @@ import pymap3d
 import pytest
 from geographiclib.geodesic import Geodesic
 
+from components.flights.leg_motion import RAMP_ROWS, Ramps
 from components.flights.many_flights import SteeredFlight
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.messages.steering import Manoeuvre
@@ -87,3 +88,14 @@ def test_it_levels_off_and_follows_the_geodesic():
     # Aloft it is longer by the height over the radius.
     assert way["s12"] * (1 + 120.0 / 6.38e6) == pytest.approx(10_000.0, abs=0.5)
     assert way["azi1"] == pytest.approx(math.degrees(math.atan2(12.0, 16.0)), abs=1e-3)
+
+
+def test_a_ramp_s_rows_lie_together_however_often_the_fleet_grew():
+    """Some ramps are taken at once at every scan: apart in memory each command copies them all."""
+    grown = Ramps(np.empty(0), np.empty((RAMP_ROWS, 0)), np.empty(0))
+    for k in range(5):
+        new = Ramps(np.full(3, float(k)), np.full((RAMP_ROWS, 3), float(k)), np.ones(3))
+        grown = grown.with_flights(new)
+    table = grown._tables.values
+    assert table.shape == (RAMP_ROWS, 15) and table[0, ::3].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert table.strides[0] == table.itemsize

@@ -138,7 +138,7 @@ def detection_threshold(pulses: ArrayLike, false_alarm_probability: ArrayLike) -
 
 @lru_cache(maxsize=4096)
 def threshold_of(pulses: int, false_alarm_probability: float) -> float:
-    """Solve for one threshold; the arguments are taken as checked."""
+    """Return the threshold that so many summed pulses of noise exceed with this probability."""
     if pulses == 1:
         return -math.log(false_alarm_probability)
     from scipy.special import gammainccinv
