@@ -79,6 +79,7 @@ FINEST_S = 1e-3
 # Flights along the very edge would be cut up all the way: with so many pieces it ends.
 _MOST_PIECES = 100_000
 _FIRST_PIECES = 64
+# Flights along the very edge would take all of the memory.
 _PAIRS_AT_ONCE = 128
 
 
@@ -99,19 +100,27 @@ def first_inside_cylinder(
     0.1 m at 200 m/s. Where more than 100,000 pieces along the edge would have to be cut, their
     length stands for `FINEST_S`.
     """
-    begin_s, end_s = between_s
-    if len(begin_s) > _PAIRS_AT_ONCE:  # flights along the very edge would take all of the memory
-        rest = (begin_s[_PAIRS_AT_ONCE:], end_s[_PAIRS_AT_ONCE:])
-        return np.concatenate([
-            first_inside_cylinder(
-                apart, (begin_s[:_PAIRS_AT_ONCE], end_s[:_PAIRS_AT_ONCE]),
-                closing_mps[:_PAIRS_AT_ONCE], horizontal_m, vertical_m,
-            ),
-            first_inside_cylinder(
-                lambda pair, time_s: apart(pair + _PAIRS_AT_ONCE, time_s), rest,
-                closing_mps[_PAIRS_AT_ONCE:], horizontal_m, vertical_m,
-            ),
-        ])  # fmt: skip
+    firsts = [
+        _first_inside_of_some(
+            apart, first,
+            *(part[first : first + _PAIRS_AT_ONCE] for part in (*between_s, closing_mps)),
+            horizontal_m, vertical_m,
+        )
+        for first in range(0, len(closing_mps), _PAIRS_AT_ONCE)
+    ]  # fmt: skip
+    return np.concatenate(firsts) if firsts else np.empty(0)
+
+
+def _first_inside_of_some(
+    apart: Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]],
+    first: int,
+    begin_s: FloatArray,
+    end_s: FloatArray,
+    closing_mps: FloatArray,
+    horizontal_m: float,
+    vertical_m: float,
+) -> FloatArray:
+    """Return `first_inside_cylinder` of the pairs from the number `first` on."""
     earliest = np.full(len(begin_s), np.inf)
     length = (end_s - begin_s) / _FIRST_PIECES
     looked_at = np.flatnonzero(end_s >= begin_s)
@@ -120,7 +129,7 @@ def first_inside_cylinder(
     start: FloatArray = begin_s[pair] + length[pair] * number
     while len(start):
         half = 0.5 * length
-        across_m, high_m = apart(pair, start + half[pair])
+        across_m, high_m = apart(first + pair, start + half[pair])
         drift_m = (closing_mps * half)[pair]
         maybe, within = _classify_pieces(across_m, high_m, drift_m, horizontal_m, vertical_m)
         pieces = np.bincount(pair[maybe], minlength=len(length))

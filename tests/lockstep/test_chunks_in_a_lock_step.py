@@ -128,6 +128,8 @@ def test_a_lock_step_of_many_aircraft_holds_as_many_fewer_runs() -> None:
     wide = RunSize.of(crowd, {"tracks": ("tick", "range_m")})
     scans = wide.recorded / (8 * 2 * 8)
     assert scans == int(scans) > 60
+    told = RunSize.of(crowd, {"manoeuvres": ("tick", "turn_rad")})
+    assert told.recorded == wide.recorded / 8  # a row for all of them
     assert wide.most == nine.most and replace(wide, recorded=1e6).most == int(360e6 / 2.4e6)
     assert are_few(crowd, 64) and not are_few(crowd, 65)
 
