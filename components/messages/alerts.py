@@ -71,6 +71,8 @@ class AlertLevels(Message):
     relative: dict[str, FloatArray] = per_entry()
     own_motion: dict[str, FloatArray] = per_row()
     roster: Roster = static()
+    #: Whether lengths are those of the plane of `east_north_m`, not of the ground.
+    in_plane: bool = static(default=False, kw_only=True)
 
     def highest(self) -> IntArray:
         """Return the highest level of each row, 0 where there is no target, (rows,)."""
