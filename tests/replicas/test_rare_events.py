@@ -296,6 +296,6 @@ def test_what_makes_splitting_impossible_is_said_before_the_first_run(keys, said
 
 
 def test_a_block_that_cannot_be_flown_again_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("components.avoidance.TurnAway.needs_host", "is a host's")
+    monkeypatch.setattr("components.turning_away.TurnAway.needs_host", "is a host's")
     with pytest.raises(SceneError, match="splitting: the block avoidance waits for a host program"):
         study_of(tmp_path)
