@@ -13,7 +13,7 @@ from components.messages.reach import FarthestLook
 from components.messages.state_tracks import STALE_S
 from components.messages.steering import Velocities
 from components.messages.targets import TrafficStates
-from dsa_des.arrays.keyed_table import KeyedTable, turns
+from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.wake import Wake
@@ -114,7 +114,7 @@ class VoltagePotential(Component):
         self._unmoved = count_cases(self._unmoved, wake.run[some & still], wake.run[some])
         place = np.array([states.own_lat_deg, states.own_lon_deg, states.own_alt_m])
         commanded = np.full((2, len(wake)), math.nan)
-        for turn in turns(wake.run):
+        for turn in occurrences_by_turn(wake.run):
             # Of most wakes all rows are of one turn, which need not be picked.
             rows = slice(None) if len(turn) == len(wake) else turn
             run = wake.run[rows]

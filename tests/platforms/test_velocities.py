@@ -9,7 +9,7 @@ from covering import covers
 from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 
 import dsa_des
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.running.nodes import find_demands
 from dsa_des.running.simulation import Simulation
 
@@ -17,7 +17,7 @@ SCENE = "configs/platforms/velocities.toml"
 
 
 def scene(**keys):
-    return scene_of(dsa_des.load_scene(SCENE), Replica(1, {"duration_s": 30, **keys}))
+    return replica_scene(dsa_des.load_scene(SCENE), Replica(1, {"duration_s": 30, **keys}))
 
 
 def of_block(table, name):
@@ -225,7 +225,7 @@ def test_the_fleet_keeps_apart_without_errors():
     exact = {
         f"blocks.exchange{s}.{key}": 0 for s in names for key in ("position_m", "velocity_mps")
     }
-    simulation = Simulation(scene_of(dsa_des.load_scene(fleet), Replica(1, exact)))
+    simulation = Simulation(replica_scene(dsa_des.load_scene(fleet), Replica(1, exact)))
     simulation.run()
     traffic, times = simulation.nodes["traffic"].component, np.arange(0.0, 200.0, 0.5)
     states = [traffic.own.at(times), *(flight.at(times) for flight in traffic.targets)]

@@ -19,7 +19,7 @@ from components.surveillance.exchange import PositionExchange
 from dsa_des.arrays.run_ticks import runs_of_single
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.record.failure_counts import Tries, add_counts
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 from tests.alerting.conf_text import CONF
@@ -110,7 +110,9 @@ def test_a_fusion_whose_sensors_never_meet_is_counted_by_runs(fusion: str) -> No
     )
     once = {"blocks.eye.offset_s": 0}
     together = replicas_of(dsa_des.load_scene(found), {}, once, {})
-    assert lock_step(together).run().failure_counts == add_counts(map(failure_counts, together))
+    assert make_lockstep_simulation(together).run().failure_counts == add_counts(
+        map(failure_counts, together)
+    )
     assert failure_counts(together[1])["fusion"] == {NOT_TOGETHER: (0, 1)}
     alone = scene({"radar": RADAR}, fusion={"type": fusion})
     assert "fusion" not in failure_counts(alone) and not any(
@@ -226,7 +228,9 @@ def test_a_tracker_that_never_has_a_track_is_counted(tracker: str, what: str) ->
                  tracker={"type": tracker})  # fmt: skip
     assert failure_counts(seen)["tracker"][what] == (0, 1)
     runs = replicas_of(dsa_des.load_scene(found), {}, {})
-    assert lock_step(runs).run().failure_counts == add_counts(map(failure_counts, runs))
+    assert make_lockstep_simulation(runs).run().failure_counts == add_counts(
+        map(failure_counts, runs)
+    )
 
 
 @pytest.mark.parametrize(
