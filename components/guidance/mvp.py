@@ -5,8 +5,7 @@ import math
 import numpy as np
 from pydantic import Field
 
-from components.geometry import enu_to_geodetic, line_of_sight_ned, radii_of_curvature
-from components.geometry.earth_models import RADIUS_M
+from components.geometry import enu_to_geodetic, find_plane_scale, line_of_sight_ned
 from components.guidance.potential import KeptApart, Others, conflicts, may_resume, push_velocity
 from components.messages.alerts import AlertLevels
 from components.messages.reach import FarthestLook
@@ -108,8 +107,7 @@ class VoltagePotential(Component):
         others, own_mps, heard = _dense(alerts, self._contacts)
         if alerts.in_plane:
             # Else a velocity that is held would be another one at every instant.
-            radii_m = np.stack(radii_of_curvature(states.own_lat_deg)[::-1])
-            own_mps *= (radii_m + states.own_alt_m) / RADIUS_M
+            own_mps *= find_plane_scale(states.own_lat_deg, states.own_alt_m)
         some, still = heard.any(axis=1), np.isnan(own_mps[0])
         self._unmoved = count_cases(self._unmoved, wake.run[some & still], wake.run[some])
         place = np.array([states.own_lat_deg, states.own_lon_deg, states.own_alt_m])
