@@ -38,6 +38,7 @@ ENDS_S = {
     "avoidance/looking_out.toml": 135,
     "avoidance/radar_and_camera.toml": 60,
     "benchmark/closed_loop_risk.toml": 60,
+    "platforms/fleet_of_16.toml": 20,
     "tracking/do365_sensors.toml": 80,
     "operator/session.toml": 10,
     "optical/pictures.toml": 5,
@@ -54,6 +55,7 @@ ENDS_S = {
 #: nobody in its time.
 UNSEEN = {
     "platforms/fleet.toml",
+    "platforms/fleet_of_16.toml",
     "platforms/velocities.toml",
     "published/degas.toml",
     "published/degas_unmitigated.toml",
