@@ -24,7 +24,7 @@ _TIMES = {
     for level in range(1, MOST_LEVELS + 1)
 }  # fmt: skip
 _TRACK = {
-    "track": Column("", "", "the tracker's number; null where tracks have none", "int64"),
+    "track": Column("", "", "the tracker's number, from 1; 0 where tracks have none", "int64"),
     "track_age_s": Column("s", "", "time since the last measurement of that track, if it has one"),
 }
 
