@@ -13,12 +13,12 @@ from dsa_des import __version__
 from dsa_des.commands.group import (
     PluginGroup,
     WithSubcommands,
-    completing,
     plain_errors,
     scene_options,
     seed_option,
     set_option,
     swap_option,
+    word_completer,
 )
 
 _figures_option = click.option(
@@ -176,8 +176,8 @@ def cost(answers: tuple[str, ...], listed: tuple[str, ...], **options: Any) -> N
 
 
 @main.command()
-@click.argument("name", required=False, shell_complete=completing("types"))
-@click.argument("key", required=False, shell_complete=completing("keys_of_type"))
+@click.argument("name", required=False, shell_complete=word_completer("types"))
+@click.argument("key", required=False, shell_complete=word_completer("keys_of_type"))
 @plain_errors
 def components(name: str | None, key: str | None) -> None:
     """List the block types or those of a kind (radar), or describe a type or one KEY of it."""
@@ -216,7 +216,7 @@ _measure_option = click.option(
 
 
 @click.command(cls=WithSubcommands)
-@click.argument("study", metavar="STUDY", required=False, shell_complete=completing("studies"))
+@click.argument("study", metavar="STUDY", required=False, shell_complete=word_completer("studies"))
 @set_option
 @swap_option
 @seed_option
@@ -273,7 +273,7 @@ def report(**options: Any) -> None:
 
 @main.command()
 @click.argument(
-    "paths", nargs=-1, required=True, metavar="A [B ...]", shell_complete=completing("examples")
+    "paths", nargs=-1, required=True, metavar="A [B ...]", shell_complete=word_completer("examples")
 )
 @set_option
 @swap_option
@@ -294,7 +294,7 @@ def compare(**options: Any) -> None:
 
 
 @main.command()
-@click.argument("case", metavar="CASE", shell_complete=completing("cases"))
+@click.argument("case", metavar="CASE", shell_complete=word_completer("cases"))
 @click.option("--out", metavar="PACK", help="Folder of the pack [default: packs/CASE-NNN].")
 @set_option
 @click.option(

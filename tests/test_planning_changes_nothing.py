@@ -12,7 +12,7 @@ from dsa_des.block.component import Context
 from dsa_des.errors import SceneError
 from dsa_des.record.arrow import ParquetSink
 from dsa_des.record.recording import Recorder
-from dsa_des.running.effects import WireFaults, plan
+from dsa_des.running.effects import WireFaults, plan_effects
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.time.randomness import Streams
@@ -38,6 +38,7 @@ ENDS_S = {
     "avoidance/looking_out.toml": 135,
     "avoidance/radar_and_camera.toml": 60,
     "benchmark/closed_loop_risk.toml": 60,
+    "platforms/fleet_of_16.toml": 20,
     "tracking/do365_sensors.toml": 80,
     "operator/session.toml": 10,
     "optical/pictures.toml": 5,
@@ -54,6 +55,7 @@ ENDS_S = {
 #: nobody in its time.
 UNSEEN = {
     "platforms/fleet.toml",
+    "platforms/fleet_of_16.toml",
     "platforms/velocities.toml",
     "published/degas.toml",
     "published/degas_unmitigated.toml",
@@ -213,7 +215,7 @@ def radar(weather: Weather, tolerance: dict[str, float], **changes: object) -> S
     }
     context = Context(Streams(1), sections={"weather": weather})
     block = SwerlingRadar("radar", SwerlingParameters(**parameters), context)
-    found = plan(block, tolerance)
+    found = plan_effects(block, tolerance)
     context.effects = {item.effect.name: item.effect.build(block) for item in found if item.built}
     block.setup()
     return block

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
 from dsa_des.block.component import ScenePath
-from dsa_des.files.input_files import InputFileError, read_once, status_of
+from dsa_des.files.input_files import InputFileError, cache_reads, readable_file_status
 from dsa_des.text.safe_text import shorten
 
 #: A table of every degree in both angles is a hundredth of it.
@@ -40,10 +40,10 @@ def _silhouette(path: Path) -> Any:
     return read_aspect_table(path)
 
 
-@read_once(64)
+@cache_reads(64)
 def _read_table_file(path: Path, reader: Callable[[Path], Any]) -> TableFile:
     # Aircraft that name the same file share one table, and are looked up in it together.
-    status_of(path, LARGEST_TABLE_BYTES)
+    readable_file_status(path, LARGEST_TABLE_BYTES)
     return TableFile(path, reader(path))
 
 

@@ -22,7 +22,7 @@ from components.alert_configuration.tcas_tables import TableKeys
 from components.formats.text_rows import MOST_OF_A_CELL, Problems, did_you_mean
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
-from dsa_des.errors import nearest
+from dsa_des.errors import nearest_name
 from dsa_des.text.safe_text import shorten
 
 #: Of each key in lower case its line number, the key as written and the text of its value.
@@ -155,7 +155,7 @@ class AlerterKeys:
                 line=number,
             )
             # Its sizes are those of the class that is meant; of none there is nothing to say.
-            class_name = nearest(class_name, allowed) or ""
+            class_name = nearest_name(class_name, allowed) or ""
         if not class_name:
             self._used |= {k for k in self._lines if k.startswith(begin)}
             return None
@@ -292,10 +292,10 @@ class AlerterKeys:
         for begin in sorted(self._beginnings, key=len, reverse=True):
             if key.startswith(begin):
                 ends = {k[len(begin) :]: shown for k, shown in free.items() if k.startswith(begin)}
-                close = nearest(key[len(begin) :], sorted(ends))
+                close = nearest_name(key[len(begin) :], sorted(ends))
                 return None if close is None else ends[close]
         plain = [k for k in free if k in KEYS or k == "alerters"]
-        if (close := nearest(key, plain)) is not None:
+        if (close := nearest_name(key, plain)) is not None:
             return close
         whole = get_close_matches(key, sorted(free), n=1, cutoff=_ALIKE)
         return free[whole[0]] if whole else None

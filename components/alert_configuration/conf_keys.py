@@ -15,7 +15,7 @@ from components.formats.text_rows import (
     TIME_S,
     clean_token,
 )
-from dsa_des.errors import nearest
+from dsa_des.errors import nearest_name
 from dsa_des.text.safe_text import shorten
 
 #: Units by kind of value, each with its factor to SI units (radians for angles).
@@ -165,7 +165,7 @@ def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, s
     if kind == "version":
         plain = plain.strip("\"'")
         if plain not in (*VERSIONS, *VERSIONS_BETWEEN):
-            close = nearest(plain, VERSIONS)
+            close = nearest_name(plain, VERSIONS)
             hint = f"; did you mean {close}?" if close else ""
             allowed = " or ".join(VERSIONS)
             raise BadValue(
@@ -193,7 +193,7 @@ def _quantity(kind: str, plain: str, unit: str, negative: bool) -> tuple[float, 
     if unit in NO_UNIT:
         raise BadValue(f"has no unit: it needs one in brackets, of {shown}")
     if unit not in factors:
-        close = nearest(unit, factors)
+        close = nearest_name(unit, factors)
         hint = f"; did you mean [{close}]?" if close else ""
         raise BadValue(f"has the unit [{shorten(unit, 20)}]: it must be one of {shown}{hint}")
     return value * factors[unit], unit
@@ -202,7 +202,7 @@ def _quantity(kind: str, plain: str, unit: str, negative: bool) -> tuple[float, 
 def _region(plain: str) -> str:
     allowed = REGIONS[:4]
     if plain.upper() not in allowed:
-        close = nearest(plain, allowed)
+        close = nearest_name(plain, allowed)
         hint = f"; did you mean {close!r}?" if close else ""
         raise BadValue(f"is {shorten(plain, 40)!r}: it must be one of {', '.join(allowed)}{hint}")
     return plain.upper()

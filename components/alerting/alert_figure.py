@@ -11,7 +11,7 @@ from components.alerting.encounter import Encounter
 from components.alerting.levels import Alerts
 from components.arguments.units import NAUTICAL_MILE_M
 from components.well_clear.volume import Volume
-from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts
 
 #: Colour of each level from 0; levels beyond the last share its colour.
 _COLOURS = ("#7f7f7f", "#e6b800", "#e07b00", "#c1121f")
@@ -29,7 +29,7 @@ def draw_alerts(
     alerts: Alerts,
 ) -> None:
     """Draw the alerts of one encounter into a PNG file."""
-    with drawing(9.0, 7.5, path) as figure:
+    with draw_to_png(9.0, 7.5, path) as figure:
         grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
         over_time = figure.add_subplot(grid[0, 0])
         _levels(over_time, configuration, encounter, alerts)

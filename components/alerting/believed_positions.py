@@ -11,7 +11,7 @@ from components.geometry import body_to_ned, east_north_m
 from components.messages.fused import FusedDetections
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
-from dsa_des.arrays.run_ticks import RunTicks, first_of_run, last_of_run
+from dsa_des.arrays.run_ticks import RunTicks, first_position_in_run, last_position_in_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.record.failure_counts import NO_RUNS, count_cases
@@ -114,8 +114,8 @@ class BelievedPositions:
         It is known from positions at two instants, not older than `keep_s`, else the last two.
         """
         came, time_s = self._seen.instants, self._seen.time_s
-        first = first_of_run(came, now.run)
-        counts = np.maximum(last_of_run(came, now) + 1 - first, 0)
+        first = first_position_in_run(came, now.run)
+        counts = np.maximum(last_position_in_run(came, now) + 1 - first, 0)
         of = np.repeat(np.arange(len(now)), counts)
         start = np.cumsum(counts) - counts
         line = np.arange(len(of)) + (first - start)[of]
@@ -169,7 +169,7 @@ class BelievedPositions:
         seen = np.isfinite(self._seen.position_m[:, 0].T)
         # The last row up to each that has a position.
         up_to = np.maximum.accumulate(np.where(seen, np.arange(len(seen))[:, np.newaxis], -1))
-        first = first_of_run(came, now.run)[:, np.newaxis]
+        first = first_position_in_run(came, now.run)[:, np.newaxis]
         target = np.arange(self._targets)
 
         def earlier(row: IntArray) -> IntArray:
@@ -177,7 +177,7 @@ class BelievedPositions:
             return np.where(found >= first, found, -1)
 
         last = earlier(
-            np.broadcast_to(last_of_run(came, now)[:, np.newaxis], (len(now), len(target)))
+            np.broadcast_to(last_position_in_run(came, now)[:, np.newaxis], (len(now), len(target)))
         )
         before = earlier(last - 1)
         while True:  # what several sensors see at one instant gives no velocity

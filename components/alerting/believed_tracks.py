@@ -20,7 +20,7 @@ from components.messages.state_tracks import (
 )
 from dsa_des.arrays.entries import row_of_entries
 from dsa_des.arrays.keyed_table import KeyedTable
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run
+from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.record.failure_counts import count_cases
@@ -255,7 +255,7 @@ def _is_needed_later(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
     ones.
     """
     ends = asked.take(asked.last_of_each)
-    last = last_of_run(came, ends)
+    last = last_position_in_run(came, ends)
     there = np.minimum(np.searchsorted(ends.run, came.run), len(ends) - 1)
     # Of runs without a scan all rows, unless they have ended.
     kept = (ends.run[there] != came.run) | (np.arange(len(came)) >= last[there])

@@ -230,6 +230,7 @@ class DaidalusAlerting(Component):
             dict(zip(_RELATIVE, relative, strict=True)),
             own,
             self._roster,
+            in_plane=True,
             run=asked.run,
         )
 

@@ -5,8 +5,8 @@ from typing import Self
 
 import numpy as np
 
-from dsa_des.arrays.keyed_table import KeyedTable, turns
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run, union
+from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
+from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run, union_of_instants
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 _NONE = -1
@@ -132,7 +132,7 @@ class LevelMemory:
             return level
         present = np.ones(len(number), dtype=bool) if present is None else present
         index = self._places(RunTicks(run, number))
-        for rows in turns(index):
+        for rows in occurrences_by_turn(index):
             part, level[rows] = self._known.take(index[rows]).step(
                 self._rule, now_s[rows], present[rows], due[rows], early[rows]
             )
@@ -157,12 +157,12 @@ class LevelMemory:
     def _places(self, those: RunTicks) -> IntArray:
         """Return the rows of targets, by run and number, all of them remembered from now on."""
         known = self._known.keys
-        index = last_of_run(known, those)
+        index = last_position_in_run(known, those)
         if len(known) and bool(((index >= 0) & (known.tick[index] == those.tick)).all()):
             return index
         order = those.order()
-        every = union([known, those if order is None else those.take(order)])
-        old, before = last_of_run(every, known), self._known
+        every = union_of_instants([known, those if order is None else those.take(order)])
+        old, before = last_position_in_run(every, known), self._known
         self._known = AlertMemory.new(self._rule, every.run.copy(), every.tick.copy())
         self._store(old, before)
-        return last_of_run(every, those)
+        return last_position_in_run(every, those)

@@ -7,7 +7,12 @@ import numpy as np
 from components.geometry import east_north_m
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.keyed_table import KeyedTable
-from dsa_des.arrays.run_ticks import RunTicks, first_of_run, last_of_run, next_of_run
+from dsa_des.arrays.run_ticks import (
+    RunTicks,
+    first_position_in_run,
+    last_position_in_run,
+    next_position_in_run,
+)
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
@@ -35,7 +40,7 @@ class ReceivedRows(KeyedTable):
 
     def last(self, asked: RunTicks) -> IntArray:
         """Return the row that came last by some instants; -1 for none."""
-        return last_of_run(self.instants, asked)
+        return last_position_in_run(self.instants, asked)
 
 
 class OwnPoses:
@@ -72,8 +77,8 @@ class OwnPoses:
 
     def pose_of(self, measured: RunTicks, came: RunTicks, asked: BoolArray) -> IntArray:
         """Return which received pose is of the instant of each measurement; -1 for none."""
-        index = np.minimum(last_of_run(self._made_ticks, measured), self._poses.last(came))
-        first = first_of_run(self._poses.instants, came.run)
+        index = np.minimum(last_position_in_run(self._made_ticks, measured), self._poses.last(came))
+        first = first_position_in_run(self._poses.instants, came.run)
         if self._old and bool((asked & (index <= first)).any()):
             every = ReceivedRows.concatenate([*self._old, self._poses])
             order = every.instants.order()
@@ -92,9 +97,9 @@ class OwnPoses:
 
     def states(self, asked: RunTicks, over_s: float) -> dict[str, FloatArray]:
         """Return the altitude, and the mean velocity over the last seconds, at some instants."""
-        earliest = first_of_run(self._poses.instants, asked.run)
+        earliest = first_position_in_run(self._poses.instants, asked.run)
         last = np.maximum(self._poses.last(asked), earliest)
-        first = next_of_run(self._made_ticks, asked.later(-round(over_s * self._per_s)))
+        first = next_position_in_run(self._made_ticks, asked.later(-round(over_s * self._per_s)))
         first = np.maximum(np.minimum(first, last - 1), earliest)
         now, then = self._poses.place[:, last], self._poses.place[:, first]
         time_s = (self._poses.tick[last] - self._poses.tick[first]) / self._per_s

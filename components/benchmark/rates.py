@@ -25,7 +25,7 @@ from components.guidance.situation import State
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.replicas.replicas import Failed, run_replicas
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.scene.scene_file import read_scene_file
@@ -120,7 +120,7 @@ def replicas_all(count: int) -> Callable[[], object]:
     def run_once() -> None:
         for start in range(0, count, _ALL_AT_ONCE):  # what a study would hold at a time
             part = scenes[start : start + _ALL_AT_ONCE]
-            lock_step(part, recorder=Recorder([ColumnSink()])).run()
+            make_lockstep_simulation(part, recorder=Recorder([ColumnSink()])).run()
 
     return run_once
 

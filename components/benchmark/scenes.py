@@ -16,7 +16,7 @@ from components.examples import folder
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink, Sink
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.time.randomness import Streams
@@ -176,7 +176,9 @@ def engine_run(scene: Scene, scenes: list[Scene], sink: Sink | None) -> tuple[fl
     recorder = Recorder([sink])
     started = time.process_time()
     simulation = (
-        lock_step(scenes, recorder=recorder) if scenes else Simulation(scene, recorder=recorder)
+        make_lockstep_simulation(scenes, recorder=recorder)
+        if scenes
+        else Simulation(scene, recorder=recorder)
     )
     build_s = time.process_time() - started
     cpu_s = _time_call(simulation.run)

@@ -24,8 +24,8 @@ from components.tracking.filters import ExtendedKalman
 from components.tracking.scans import Scans, scans_of
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.wake import Wake
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.changed_scene import Replica, replica_scene
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 
 _DURATION_S = 4
 #: Of radar and two cameras, in `_DURATION_S`.
@@ -55,7 +55,9 @@ def make_listening(replicas: int, targets: int) -> Listening:
     Three sensors see every target at every look.
     """
     scene = dsa_des.load_scene(_scene(targets))
-    simulation = lock_step([scene_of(scene, Replica(1 + i, {})) for i in range(replicas)])
+    simulation = make_lockstep_simulation(
+        [replica_scene(scene, Replica(1 + i, {})) for i in range(replicas)]
+    )
     simulation.run()
     block: Any = simulation.components["tracker"]
     assert isinstance(block, Listening)

@@ -9,7 +9,7 @@ from components.display.outcomes import NEAR_M, distances
 from components.display.tracks import COLOURS, MOST_SPREADS, STATE, DrawnTracks
 from components.messages.state_tracks import full_covariance
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts, plain_log_ticks
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, plain_log_ticks
 from dsa_des.results.statistics import chi_square_bounds
 
 _MOST_ERRORS = 2000
@@ -64,7 +64,7 @@ def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
         block: f"{every.mean():.3g}, {_percent((every >= low) & (every <= high))} inside"
         for block, every in of_block.items()
     }
-    with drawing(9.0, 6.4, path) as figure:
+    with draw_to_png(9.0, 6.4, path) as figure:
         errors, innovations = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         names = {block: f"{figure_text(block, 16)}: {words}" for block, words in said.items()}
         if len(shown) > MOST_SPREADS:

@@ -40,7 +40,7 @@ from components.messages.reach import Reach
 from components.sensor.mounting import SensorAxes
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import Mark
-from dsa_des.record.drawing import DPI, drawing, figure_text
+from dsa_des.record.drawing import DPI, draw_to_png, figure_text
 from dsa_des.running.simulation import Simulation
 
 # Inches around the map.
@@ -81,7 +81,7 @@ def draw_plan(
     height_in = below_in + view.height_in + _TOP_IN
     left, right = _LEFT_IN / width_in, (_LEFT_IN + MAP_WIDTH_IN) / width_in
     bottom, high = below_in / height_in, view.height_in / height_in
-    with drawing(width_in, height_in, path) as figure:
+    with draw_to_png(width_in, height_in, path) as figure:
         axes = figure.add_axes((left, bottom, right - left, high))
         axes.set(xlim=view.x, ylim=view.y)
         axes.set_xlabel("east of the ownship's start (km)")

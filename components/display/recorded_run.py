@@ -13,7 +13,7 @@ import numpy as np
 from components.messages.columns import POSE as POSE_COLUMNS
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.errors import UsageError, did_you_mean
-from dsa_des.record.run_folder import Run, with_columns_of_rows
+from dsa_des.record.run_folder import Run, join_row_columns
 from dsa_des.scene.examples import find_example
 
 _STATE = (
@@ -100,7 +100,7 @@ class RecordedTables:
 
     @cached_property
     def _join_pose(self) -> Any:
-        return with_columns_of_rows(self.tables, "detections")
+        return join_row_columns(self.tables, "detections")
 
     def table(self, name: str) -> Any:
         """Return a table; detections have with them where the ownship was at each."""

@@ -33,8 +33,8 @@ from components.display.symbols import (
 )
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import Mark
-from dsa_des.record.drawing import DPI, drawing, figure_text
-from dsa_des.replicas.times_out import times_out_s
+from dsa_des.record.drawing import DPI, draw_to_png, figure_text
+from dsa_des.replicas.times_out import outage_times_of_seeds
 from dsa_des.running.simulation import Simulation
 
 Scans = dict[str, SensorScans]
@@ -68,7 +68,7 @@ def draw_timeline(
     duration_s = float(simulation.duration_s)
     scans = read_scans(folder)
     title = figure_text(simulation.scene.title, 80)
-    with drawing(*_SIZE_IN, path) as figure:
+    with draw_to_png(*_SIZE_IN, path) as figure:
         if not scans:  # a scene without sensors has ranges only
             whole = figure.add_axes((_LEFT, 0.1, _BELOW, 0.8))
             _draw_ranges(whole, flights, detected, duration_s, alerted)
@@ -85,7 +85,7 @@ def draw_timeline(
         _draw_ranges(below, flights, detected, duration_s, alerted)
         below.axvspan(close_up.start_s, close_up.end_s, color="#000000", alpha=0.12, linewidth=0)
         scene = simulation.scene
-        out_s = times_out_s(scene, [scene.seed], np.array([duration_s]))
+        out_s = outage_times_of_seeds(scene, [scene.seed], np.array([duration_s]))
         bars = _draw_times_out(below, {n: s for n, (s,) in out_s.items()}, detected.styles)
         below.set_title(f"Whole run (shaded: the part above{bars})", loc="left")
     return path

@@ -19,7 +19,7 @@ from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.mark import PALETTE
-from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts
 from dsa_des.running.simulation import Simulation
 
 #: Of trackers and tracks, in turn; black is the truth.
@@ -129,7 +129,7 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
     """Draw tracks with their 95 % ellipses on the plan and by height, and write the PNG."""
     grid = np.linspace(*drawn.time_s, _MOST_POINTS)
     positions, own = drawn.targets.positions_at(grid), drawn.targets.position(drawn.own, grid)
-    with drawing(7.5, 8.4, path) as figure:
+    with draw_to_png(7.5, 8.4, path) as figure:
         plan, height = figure.subplots(2, 1, height_ratios=(3, 1))
         _flight(plan, height, grid, own, drawn.origin[2], {"color": _OWN, "linestyle": "--"})
         dense = len(positions) >= DENSE

@@ -8,11 +8,11 @@ from typing import Any
 from components.embedding.host_traffic import HostTraffic, HostTrafficParameters, Plane
 from components.messages.targets import TrafficStates
 from dsa_des.block.component import Component, Context
-from dsa_des.block.registry import UnknownType, find
+from dsa_des.block.registry import UnknownType, find_component
 from dsa_des.errors import Problem, SceneError, UsageError, did_you_mean
 from dsa_des.scene.block_table import Block
 from dsa_des.scene.examples import find_input_file
-from dsa_des.scene.platforms import platforms_of
+from dsa_des.scene.platforms import platform_by_block
 from dsa_des.scene.scene import Scene, load_tables
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.time.randomness import Streams
@@ -59,7 +59,7 @@ def _select_platform(scene: Scene, platform: str) -> Scene:
     block = scene.blocks[name]
     context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
     names = block.cls(name, block.parameters, context).platforms()
-    carrying = platforms_of(scene, {name: names}) if names else {}
+    carrying = platform_by_block(scene, {name: names}) if names else {}
     known = sorted({*carrying.values()})
     if platform not in known:
         message = f"nothing of this scene is carried by {platform!r}{did_you_mean(platform, known)}"
@@ -77,7 +77,7 @@ def _select_platform(scene: Scene, platform: str) -> Scene:
 def _has_traffic(scene_file: SceneFile) -> bool:
     for table in scene_file.data["blocks"].values():
         try:
-            if isinstance(table, dict) and _is_traffic(find(str(table.get("type")))):
+            if isinstance(table, dict) and _is_traffic(find_component(str(table.get("type")))):
                 return True
         except UnknownType:  # said when the scene is checked
             continue

@@ -14,7 +14,7 @@ from components.embedding.states import to_numbers
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.examples import find_input_file
-from dsa_des.scene.parameter_errors import explain
+from dsa_des.scene.parameter_errors import explain_validation_error
 from dsa_des.scene.scene_file import SceneFile, merge, read_scene_file
 
 _CALL = "add_plane"
@@ -58,7 +58,9 @@ def plane_of(name: str, aircraft: object, values: Mapping[str, Any]) -> Plane:
     try:
         return Plane.model_validate(described.data)
     except ValidationError as error:
-        raise SceneError(explain(described, (), "an aircraft", Plane, error)) from error
+        raise SceneError(
+            explain_validation_error(described, (), "an aircraft", Plane, error)
+        ) from error
 
 
 def _leave_out_flight(data: dict[str, Any]) -> None:

@@ -33,7 +33,7 @@ from components.formats.set_file import EncounterSetError, is_origin
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
 from dsa_des.errors.budgets import refuse_samples
-from dsa_des.files.input_files import InputFileError, read_input_text, read_once, resolve_home
+from dsa_des.files.input_files import InputFileError, cache_reads, read_input_text, resolve_home
 from dsa_des.files.toml_files import parse_toml
 
 _LENGTH, _SPEED = {"m": 1.0, "ft": FOOT_M}, {"mps": 1.0, "kt": KNOT_M_S}
@@ -221,7 +221,7 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-@read_once(32)
+@cache_reads(32)
 def read_made(path: Path) -> EncounterSet:
     """Return the encounters of a table."""
     try:

@@ -24,7 +24,7 @@ from components.encounters.model import (
 )
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import did_you_mean, shown_value
-from dsa_des.files.input_files import InputFileError, read_input_text, read_once
+from dsa_des.files.input_files import InputFileError, cache_reads, read_input_text
 
 PARTS = (
     "labels_initial", "G_initial", "r_initial", "N_initial",
@@ -50,7 +50,7 @@ class ModelFileError(ValueError):
     """A model file cannot be used; the message names the file, and the part, line or variable."""
 
 
-@read_once(8)
+@cache_reads(8)
 def read_model(path: Path) -> EncounterModel:
     """Read and check a model file."""
     try:

@@ -205,9 +205,9 @@ def _classes(c: Closest) -> list[list[str]]:
 
 def _draw(encounters: EncounterSet, indices: list[int], c: Closest, path: Path) -> None:
     """Draw histograms of the geometry, as drawn and as weighted, and a plan of a sample."""
-    from dsa_des.record.drawing import drawing
+    from dsa_des.record.drawing import draw_to_png
 
-    with drawing(11.0, 6.5, path) as figure:
+    with draw_to_png(11.0, 6.5, path) as figure:
         axes: Any = figure.subplots(2, 3)
         parts = (
             ("horizontal distance (m)", c.horizontal_m), ("vertical distance (m)", c.vertical_m),

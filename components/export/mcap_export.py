@@ -23,7 +23,7 @@ from components.export.globe_run import (
 )
 from components.geometry import line_of_sight_ned
 from dsa_des.arrays.types import FloatArray
-from dsa_des.errors.extras import library
+from dsa_des.errors.extras import import_extra
 
 _NANO = 10**9
 #: The frame of all that is drawn: east, north and up of where the first aircraft begins.
@@ -72,7 +72,7 @@ def mcap_bytes(run: RecordedTables) -> bytes:
     ``/aircraft/NAME/location`` and ``/pose`` are the true flights, where they are recorded; axes of
     a pose are forward, left and up. ``/detections`` are drawn where they have a range.
     """
-    writer_of = library("mcap.writer", "mcap", "MCAP")
+    writer_of = import_extra("mcap.writer", "mcap", "MCAP")
     stream = io.BytesIO()
     writer = writer_of.Writer(stream, compression=writer_of.CompressionType.NONE)
     writer.start(library="dsa_des")

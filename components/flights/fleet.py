@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from components.geometry import TrajectoryState
-from dsa_des.arrays.column_values import constant
+from dsa_des.arrays.column_values import constant_column
 from dsa_des.arrays.growing_arrays import Growing
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -275,7 +275,9 @@ class FormulaGroup:
             now = self.formula(self.table, inside)
             # Of flights that keep their altitude one row of them is for all times.
             moving = moving or [
-                np.empty(shape) if len(v) == len(inside) else constant(v[0], len(times), v.dtype)
+                np.empty(shape)
+                if len(v) == len(inside)
+                else constant_column(v[0], len(times), v.dtype)
                 for v in now
             ]
             for out, values in zip(moving, now, strict=True):
@@ -284,7 +286,7 @@ class FormulaGroup:
             np.logical_and(t >= start_s, t <= end_s, out=present[block])
         lat, lon, alt, yaw = moving or np.empty((4, *shape))
         fixed_yaw, *others = self.attitude
-        pitch, roll = (constant(angle, len(times), angle.dtype) for angle in others)
+        pitch, roll = (constant_column(angle, len(times), angle.dtype) for angle in others)
         if np.count_nonzero(self.yaw_is_fixed):
             yaw = np.where(self.yaw_is_fixed, fixed_yaw, yaw)
         return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from components.formats.asterix_records import callsign
-from dsa_des.errors.extras import library
+from dsa_des.errors.extras import import_extra
 
 _E7, _MILLI, _CENTI = 1e7, 1e3, 1e2
 _DIALECT = "pymavlink.dialects.v20.common"
@@ -63,7 +63,7 @@ class Link:
     """Makes and takes apart the datagrams of one connection."""
 
     def __init__(self) -> None:
-        self._dialect = library(_DIALECT, "mavlink", "foreign.mavlink")
+        self._dialect = import_extra(_DIALECT, "mavlink", "foreign.mavlink")
         self._ours = self._dialect.MAVLink(None, _SYSTEM, _COMPONENT)
 
     def heartbeat(self) -> bytes:

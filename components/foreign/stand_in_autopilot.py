@@ -10,7 +10,7 @@ import socket
 import sys
 from typing import Any
 
-from dsa_des.errors.extras import library
+from dsa_des.errors.extras import import_extra
 
 _NEAR_M, _LEVEL_M, _AHEAD_S, _TURN_RAD, _PAUSE_S = 600.0, 150.0, 60.0, math.radians(45.0), 120.0
 _M_PER_E7 = 111_200.0 / 1e7
@@ -21,7 +21,7 @@ class StandIn:
     """Replies to datagrams: each state of the ownship by an attitude and a position."""
 
     def __init__(self) -> None:
-        dialect = library("pymavlink.dialects.v20.common", "mavlink", "the stand-in autopilot")
+        dialect = import_extra("pymavlink.dialects.v20.common", "mavlink", "the stand-in autopilot")
         self._link = dialect.MAVLink(None, 1, 1)
         self._link.robust_parsing = True
         self._others: list[Any] = []

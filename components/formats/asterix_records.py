@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.formats.text_rows import TrafficFileError
 from dsa_des.errors import UsageError
-from dsa_des.errors.extras import library
+from dsa_des.errors.extras import import_extra
 
 DAY_S = 86400.0
 #: Reports of a radar's own service, plots, system tracks, and ADS-B reports.
@@ -158,7 +158,7 @@ _MOST_OF_A_BLOCK = 1000
 
 def _categories() -> dict[int, Any]:
     """Return the newest edition of each category that we know."""
-    generated = library("asterix.generated", "asterix", "ASTERIX")
+    generated = import_extra("asterix.generated", "asterix", "ASTERIX")
     return {number: generated.manifest["CATS"][number][-1] for number in FIELDS}
 
 
@@ -348,7 +348,7 @@ def _readers() -> dict[int, _Reader]:
 
     Its own objects of every bit would take 0.6 ms a record.
     """
-    base = library("asterix.base", "asterix", "ASTERIX")
+    base = import_extra("asterix.base", "asterix", "ASTERIX")
 
     def takes_of(items: Any, fields: Mapping[str, Any], prefix: str, at: int) -> list[_Take]:
         found = []

@@ -23,7 +23,7 @@ from components.formats.encounter_set import (
 )
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.errors import OutputError, did_you_mean, shown_value
-from dsa_des.files.input_files import InputFileError, read_once, status_of
+from dsa_des.files.input_files import InputFileError, cache_reads, readable_file_status
 from dsa_des.files.output_file import stream_file
 from dsa_des.files.output_names import reason_of
 
@@ -61,14 +61,14 @@ class EncounterSetError(ValueError):
     """A set cannot be used; each line of the message names the file, and the encounter if one."""
 
 
-@read_once(4)
+@cache_reads(4)
 def read_set(path: Path, skip_damaged: bool = False) -> EncounterSet:
     """Read a set of encounters."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
-        status_of(path, _LARGEST_BYTES)
+        readable_file_status(path, _LARGEST_BYTES)
         table = pq.read_table(path)
     except InputFileError as error:
         raise EncounterSetError(f"{path}: {error}") from None

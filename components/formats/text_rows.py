@@ -15,7 +15,7 @@ from typing import NoReturn
 
 from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.flights.sampled_flight import SampledTrajectory
-from dsa_des.errors import Lines, nearest
+from dsa_des.errors import Lines, nearest_name
 from dsa_des.files.input_files import (
     LARGEST_BYTES,
     InputFileError,
@@ -162,7 +162,7 @@ def shown_columns(headers: Iterable[str], known: bool) -> str:
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:
     """Return a suggestion for a misspelt name, or an empty string when nothing is close."""
-    close = nearest(name, sorted(allowed))
+    close = nearest_name(name, sorted(allowed))
     return f"; did you mean {close!r}?" if close else ""
 
 

@@ -15,7 +15,7 @@ from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.navigation.errors import navigation_errs
 from components.sensor.marks import FUSION
-from dsa_des.arrays.run_ticks import RunTicks, ranks, take_runs
+from dsa_des.arrays.run_ticks import RunTicks, rank_instants, take_runs
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Producer
 from dsa_des.block.ladder import Verified
@@ -326,7 +326,7 @@ def latest_in_gate(
     if not counts.any():
         return np.full(len(asked), -1, dtype=np.int64)
     # Ranks of instants stay small where ticks times targets would overflow.
-    (came, now), span = ranks(arrivals.instants, asked)
+    (came, now), span = rank_instants(arrivals.instants, asked)
     row = np.repeat(np.arange(len(counts)), counts)
     entry_key = arrivals.message.target * span + came[row]
     order = np.argsort(entry_key, kind="stable")

@@ -19,7 +19,7 @@ from components.geometry import (
 )
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run, next_of_run
+from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run, next_position_in_run
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 from dsa_des.block.wake import Arrivals, Wake
@@ -102,8 +102,8 @@ def nearest_in_gate(one: Entries, anchors: IntArray, other: Entries, gates: Gate
     order = others.order()
     in_time = np.arange(len(others)) if order is None else order
     others = others.take(in_time)
-    first = next_of_run(others, asked.later(-gates.ticks))
-    counts = next_of_run(others, asked.later(gates.ticks + 1)) - first
+    first = next_position_in_run(others, asked.later(-gates.ticks))
+    counts = next_position_in_run(others, asked.later(gates.ticks + 1)) - first
     which = np.repeat(np.arange(len(anchors)), counts)
     start = np.repeat(np.cumsum(counts) - counts, counts)
     candidate = in_time[np.arange(len(which)) - start + np.repeat(first, counts)]
@@ -199,7 +199,9 @@ class Gated(Fusion):
         gathered: dict[str, list[IntArray]] = {name: [] for name in order}
         for anchor in order:
             mine, one = np.flatnonzero(free[anchor]), seen[anchor]
-            rows.append(last_of_run(wake.instants, RunTicks(one.run[mine], one.came[mine])))
+            rows.append(
+                last_position_in_run(wake.instants, RunTicks(one.run[mine], one.came[mine]))
+            )
             anchors.append((anchor, mine))
             for other in order:
                 if other == anchor:

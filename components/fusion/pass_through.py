@@ -8,7 +8,7 @@ from components.fusion.fusion_block import Fusion, single_entry_rows
 from components.messages.columns import POSE
 from components.messages.fused import FusedDetections
 from components.messages.looks import Looks
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run
+from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run
 from dsa_des.block.component import Parameters
 from dsa_des.block.message import offsets_of
 from dsa_des.block.wake import Arrivals, Wake
@@ -36,7 +36,7 @@ class PassThrough(Fusion):
             return None
         alone = {}
         for name, new in arrivals.items():
-            row = last_of_run(wake.instants, new.instants)
+            row = last_position_in_run(wake.instants, new.instants)
             row = np.repeat(row, np.diff(new.message.offsets))
             alone[name] = row, np.arange(len(row))
         row, entries = single_entry_rows(alone, arrivals)
@@ -53,7 +53,7 @@ class PassThrough(Fusion):
             message = new.message
             if message.ticks_after is not None:
                 continue
-            row.append(last_of_run(instants, new.instants))
+            row.append(last_position_in_run(instants, new.instants))
             sensor.append(np.full(len(message), self.sensors.index(name)))
             age.append(new.tick - message.tick)
             own = [getattr(message, column) for column in POSE]

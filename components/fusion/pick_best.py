@@ -14,7 +14,7 @@ from components.fusion.ladder import FUSION_LADDER
 from components.messages.detections import SensorOffer
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
-from dsa_des.arrays.run_ticks import last_of_run, positions_among
+from dsa_des.arrays.run_ticks import last_position_in_run, positions_among
 from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters, Producer
@@ -147,6 +147,6 @@ def _true_entries(new: Arrivals) -> IntArray | None:
 
 def _keys(new: Arrivals, wake: Wake, width: int, of: IntArray | None) -> IntArray:
     """Return instant · width + target of some entries."""
-    row = last_of_run(wake.instants, new.instants)  # they are among them
+    row = last_position_in_run(wake.instants, new.instants)  # they are among them
     keys = row.take(new.message.row_of_entries) * width + new.message.target
     return keys if of is None else keys[of]

@@ -55,6 +55,7 @@ from components.geometry.earth_models import (
     SeenFromOwnship,
     east_north_m,
     east_north_mps,
+    find_plane_scale,
     geodesic_line_of_sight,
 )
 from components.geometry.ellipsoid import (

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from components.arguments.checks import broadcast_results, common_shape, squarable
-from dsa_des.arrays.column_values import one_row
+from dsa_des.arrays.column_values import first_row_if_constant
 from dsa_des.arrays.types import FloatArray
 
 Vector = tuple[FloatArray, FloatArray, FloatArray]
@@ -192,7 +192,7 @@ def sine_and_cosine(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
         The angle's shape, one row of it where all rows are known to be the same, or (1,) in its
         place where all angles are.
     """
-    angle_rad = one_row(angle_rad)
+    angle_rad = first_row_if_constant(angle_rad)
     if angle_rad.size > _LOOK_FOR_ONE_ANGLE and angle_rad.min() == angle_rad.max():
         angle_rad = angle_rad.reshape(-1)[:1]
     return np.sin(angle_rad), np.cos(angle_rad)

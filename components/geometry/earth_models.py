@@ -107,6 +107,12 @@ def east_north_m(
     return east, north
 
 
+def find_plane_scale(lat_deg: FloatArray, alt_m: FloatArray) -> FloatArray:
+    """Find how many metres over the ground a metre in that plane is, east and north (2, n)."""
+    meridian_m, prime_vertical_m = radii_of_curvature(lat_deg)
+    return (np.stack([prime_vertical_m, meridian_m]) + alt_m) / RADIUS_M
+
+
 def east_north_mps(
     lat_rad: FloatArray,
     lon_rad: FloatArray,

@@ -22,7 +22,7 @@ from components.geometry.attitude import (
     unit_vector,
     unit_vector_unchecked,
 )
-from dsa_des.arrays.column_values import one_row
+from dsa_des.arrays.column_values import first_row_if_constant
 from dsa_des.arrays.types import FloatArray
 
 # Of an azimuth of which nothing is known: uniform over the circle.
@@ -173,11 +173,11 @@ def sensor_angles_of_offsets(
     """
     x, y = turn_axes(north_m, east_m, yaw_rad)
     z = 0.0 - up_m
-    if one_row(
+    if first_row_if_constant(
         pitch_rad
     ).any():  # straight and level, as most fly most of the time, these change nothing
         z, x = turn_axes(z, x, pitch_rad)
-    if one_row(roll_rad).any():
+    if first_row_if_constant(roll_rad).any():
         y, z = turn_axes(y, z, roll_rad)
     level = x * x
     level += y * y

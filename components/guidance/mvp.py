@@ -5,13 +5,14 @@ import math
 import numpy as np
 from pydantic import Field
 
-from components.geometry import enu_to_geodetic, line_of_sight_ned
+from components.geometry import enu_to_geodetic, find_plane_scale, line_of_sight_ned
 from components.guidance.potential import KeptApart, Others, conflicts, may_resume, push_velocity
 from components.messages.alerts import AlertLevels
 from components.messages.reach import FarthestLook
+from components.messages.state_tracks import STALE_S
 from components.messages.steering import Velocities
 from components.messages.targets import TrafficStates
-from dsa_des.arrays.keyed_table import KeyedTable, turns
+from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.wake import Wake
@@ -55,10 +56,12 @@ class PotentialParameters(Parameters):
 class VoltagePotential(Component):
     """Leads a multirotor out of conflicts by the modified voltage potential.
 
-    A pair is active from its first conflict until it is past and apart. With conflicts the velocity
-    is the one they push to; with active pairs only, that of the moment is kept; else it is that of
-    its own way: along its first track, or to its goal from where it truly is. Only what is another
-    velocity than before is commanded.
+    A pair is active from its first conflict until it is past and apart, or until nothing has been
+    heard of the other one for 30 s. With conflicts the velocity is the one they push to; with
+    active pairs only, that of the moment is kept; else it is that of its own way: along its first
+    track, or to its goal from where it truly is. Only what is another velocity than before is
+    commanded. Behind a tracker that estimates, others are its tracks by their numbers, whatever
+    they are of: false ones are avoided too, and two of one aircraft push twice.
     """
 
     inputs = {
@@ -67,7 +70,7 @@ class VoltagePotential(Component):
     }
     outputs = {"manoeuvres": Output(Velocities, "Velocities that it is told to fly.")}
     Parameters = PotentialParameters
-    remembers = ("_known", "_strange", "_unmoved")
+    remembers = ("_known", "_contacts", "_unmoved")
     windowed = True
     lockstep = True
     rewindable = True
@@ -84,31 +87,32 @@ class VoltagePotential(Component):
     def setup(self) -> None:
         """Start without having seen anybody."""
         self._kept = KeptApart(self.p.radius_m, self.p.margin, self.p.lookahead_s)
-        #: By run: which others are active, first track, goal, and the last velocity commanded.
+        #: By run: which contacts are active, and since when nothing was heard of them, first track,
+        #: goal, and the last velocity commanded.
         self._known = KeyedTable.empty({"replica": int})
-        #: How many entries are of no target, of how many; and how often its own velocity lacked.
-        self._strange, self._unmoved = NO_COUNTS, NO_COUNTS
+        self._contacts: IntArray = np.empty(0, dtype=np.int64)
+        #: How often its own velocity lacked.
+        self._unmoved = NO_COUNTS
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return whom it did not steer for, and how often it could not at all."""
-        return {
-            "a track is near no target and is not steered for": self._strange,
-            "its own velocity is not known yet and it does not steer": self._unmoved,
-        }
+        """Return how often it could not steer."""
+        return {"its own velocity is not known yet and it does not steer": self._unmoved}
 
     def run(self, wake: Wake) -> Velocities | None:
         """Decide at every instant, of each run one after the other."""
         alerts, states = wake["alerts"], wake["states"]
         if alerts is None or states is None:
             return None
-        others, own_mps, heard = _dense(alerts)
-        of = wake.run[alerts.row_of_entries]
-        self._strange = count_cases(self._strange, of[alerts.target < 0], of)
+        self._make_room(alerts)
+        others, own_mps, heard = _dense(alerts, self._contacts)
+        if alerts.in_plane:
+            # Else a velocity that is held would be another one at every instant.
+            own_mps *= find_plane_scale(states.own_lat_deg, states.own_alt_m)
         some, still = heard.any(axis=1), np.isnan(own_mps[0])
         self._unmoved = count_cases(self._unmoved, wake.run[some & still], wake.run[some])
         place = np.array([states.own_lat_deg, states.own_lon_deg, states.own_alt_m])
         commanded = np.full((2, len(wake)), math.nan)
-        for turn in turns(wake.run):
+        for turn in occurrences_by_turn(wake.run):
             # Of most wakes all rows are of one turn, which need not be picked.
             rows = slice(None) if len(turn) == len(wake) else turn
             run = wake.run[rows]
@@ -116,6 +120,7 @@ class VoltagePotential(Component):
             new = KeyedTable(
                 replica=run,
                 active=np.zeros((heard.shape[1], len(turn)), dtype=bool),
+                unheard_s=np.full((heard.shape[1], len(turn)), math.nan),
                 track=yaw,
                 goal=place[:, rows].copy(),
                 last_mps=np.full((2, len(turn)), math.nan),
@@ -129,6 +134,11 @@ class VoltagePotential(Component):
             now = conflicts(seen, self._kept) & heard[rows]
             done = may_resume(seen, own, self._kept) | ~np.isfinite(own[0])[:, np.newaxis]
             active = now | (known.active.T & ~(done & heard[rows]))
+            unheard_s = new.unheard_s
+            if not heard[rows].all():
+                time_s = wake.time_s[rows]
+                unheard_s = np.where(heard[rows].T, math.nan, np.fmin(known.unheard_s, time_s))
+                active &= ~(time_s - unheard_s > STALE_S).T
             velocity = self._undisturbed_velocity(known, place[:, rows])
             velocity = np.where(active.any(axis=1), own, velocity)
             pushed = now.any(axis=1)
@@ -141,9 +151,25 @@ class VoltagePotential(Component):
             velocity = np.where(same | np.isnan(velocity[0]), known.last_mps, velocity)
             told = (velocity != known.last_mps).any(axis=0) & np.isfinite(velocity[0])
             commanded[:, turn[told]] = velocity[:, told]
-            newer = known.with_columns(active=active.T.copy(), last_mps=velocity)
+            newer = known.with_columns(
+                active=active.T.copy(), unheard_s=unheard_s, last_mps=velocity
+            )
             self._known = self._known.replace_runs(run, newer, wake.first_run)
         return self._velocities(wake, commanded)
+
+    def _make_room(self, alerts: AlertLevels) -> None:
+        """Let contacts be those of alerts, and tracks that are active; targets are always all."""
+        contacts = np.arange(len(alerts.roster))
+        if alerts.numbers:
+            active = self._known.active.any(axis=1) if len(self._known) else []
+            contacts = np.union1d(self._contacts[active], alerts.contacts())
+        if len(self._known) and not np.array_equal(contacts, self._contacts):
+            _, new, old = np.intersect1d(contacts, self._contacts, True, return_indices=True)
+            shape = len(contacts), len(self._known)
+            active, unheard_s = np.zeros(shape, dtype=bool), np.full(shape, math.nan)
+            active[new], unheard_s[new] = self._known.active[old], self._known.unheard_s[old]
+            self._known = self._known.with_columns(active=active, unheard_s=unheard_s)
+        self._contacts = contacts
 
     def _undisturbed_velocity(self, known: KeyedTable, place: FloatArray) -> FloatArray:
         """Return the velocity (2, n) to fly without a conflict."""
@@ -184,25 +210,26 @@ class VoltagePotential(Component):
         )  # fmt: skip
 
 
-def _dense(alerts: AlertLevels) -> tuple[Others, FloatArray, BoolArray]:
-    """Return the others' states at each row, NaN where unknown, own velocities, and who is known.
+def _dense(alerts: AlertLevels, contacts: IntArray) -> tuple[Others, FloatArray, BoolArray]:
+    """Return states of contacts at each row, NaN where unknown, own velocities, and who is known.
 
     Positions in alerts are the ownship's less the target's.
     """
-    shape, target = (len(alerts), len(alerts.roster)), alerts.target
+    shape, place = (len(alerts), len(contacts)), alerts.target
+    if alerts.numbers:
+        place = np.searchsorted(contacts, alerts.contacts())
     own = np.array([alerts.own_motion[name] for name in ("east_mps", "north_mps")])
     names = ("east_m", "north_m"), ("east_mps", "north_mps")
-    if len(target) == math.prod(shape) and (target.reshape(shape) == np.arange(shape[1])).all():
+    if len(place) == math.prod(shape) and (place.reshape(shape) == np.arange(shape[1])).all():
         every = (np.stack([-alerts.relative[of].reshape(shape) for of in two]) for two in names)
         return Others(*every), own, np.ones(shape, dtype=bool)
-    known = target >= 0
-    at = alerts.row_of_entries[known], target[known]
+    at = alerts.row_of_entries, place
     heard = np.zeros(shape, dtype=bool)
     heard[at] = True
     parts = []
     for two in names:
         part = np.full((2, *shape), math.nan)
         for axis, name in zip(part, two, strict=True):
-            axis[at] = -alerts.relative[name][known]
+            axis[at] = -alerts.relative[name]
         parts.append(part)
     return Others(*parts), own, heard

@@ -92,9 +92,9 @@ def push_velocity(
     angle = np.arcsin(np.where(outside, radius_m / far_m, 0.0))
     angle = angle - np.arcsin(np.where(outside, miss_m / far_m, 0.0))
     gain_m = np.where(outside, radius_m / np.cos(angle), radius_m) - miss_m
-    push = np.zeros((2, *pushing.shape))
-    push[:, row, column] = gain_m / (np.maximum(np.abs(time_s), _LEAST_TIME_S) * miss_m) * miss
-    return np.asarray(own_mps - push.sum(axis=-1))
+    push = gain_m / (np.maximum(np.abs(time_s), _LEAST_TIME_S) * miss_m) * miss
+    # One after the other, so that it does not matter for whom else there is room.
+    return own_mps - np.stack([np.bincount(row, of, len(pushing)) for of in push])
 
 
 def _squared(vector: FloatArray) -> FloatArray:

@@ -146,13 +146,13 @@ def _draw(
     from matplotlib.lines import Line2D
 
     from dsa_des.block.mark import RED
-    from dsa_des.record.drawing import drawing
+    from dsa_des.record.drawing import draw_to_png
 
     styles: list[Any] = list(zip(contours, ("#FFFFFF", RED), ("--", "-"), strict=True))
     # A column for each model, and one for the bar of shades.
     width_in = 1.4 + 2.0 * len(maps)
     left, pitch = 0.56 / width_in, 2.0 / width_in
-    with drawing(width_in, 3.5, path) as figure:
+    with draw_to_png(width_in, 3.5, path) as figure:
         figure.suptitle(
             f"{title}, worst of all bearings, both aircraft 1 km high\n{note}",
             x=0.06,

@@ -29,7 +29,7 @@ from components.sensor.ladder_values import (
     angular_distance_mrad,
     spread_over_roster,
 )
-from dsa_des.arrays.column_values import constant_if_equal, one_row
+from dsa_des.arrays.column_values import constant_if_equal, first_row_if_constant
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable, Verified
@@ -318,7 +318,7 @@ def _broadcast_ownship(states: TrafficStates) -> SimpleNamespace:
 def _require_numbers(*angles: FloatArray) -> None:
     """Refuse what is not a finite number, here for all blocks downstream."""
     # A sum is finite only if all of it is; it stands for whatever the angles came from.
-    if not math.isfinite(sum(one_row(values).sum() for values in angles)):
+    if not math.isfinite(sum(first_row_if_constant(values).sum() for values in angles)):
         raise ValueError("a position or an attitude of the traffic is not a finite number")
 
 

@@ -24,7 +24,7 @@ _TIMES = {
     for level in range(1, MOST_LEVELS + 1)
 }  # fmt: skip
 _TRACK = {
-    "track": Column("", "", "the tracker's number; null where tracks have none", "int64"),
+    "track": Column("", "", "the tracker's number, from 1; 0 where tracks have none", "int64"),
     "track_age_s": Column("s", "", "time since the last measurement of that track, if it has one"),
 }
 
@@ -71,6 +71,8 @@ class AlertLevels(Message):
     relative: dict[str, FloatArray] = per_entry()
     own_motion: dict[str, FloatArray] = per_row()
     roster: Roster = static()
+    #: Whether lengths are those of the plane of `east_north_m`, not of the ground.
+    in_plane: bool = static(default=False, kw_only=True)
 
     def highest(self) -> IntArray:
         """Return the highest level of each row, 0 where there is no target, (rows,)."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.message import PER_ROW, Message, column
+from dsa_des.block.message import PER_ROW, Message, column, offsets_of
 
 #: Slower turns are none: at 340 m/s their radius is beyond the 200 km that flights can have.
 SLOWEST_TURN_DEG_S = 0.1
@@ -167,29 +167,41 @@ class Velocities(Manoeuvres):
 
 @dataclass(eq=False)
 class ChosenSides(Message):
-    """The side of a manoeuvre that an aircraft has chosen, sent to others that coordinate with it.
+    """The side of a manoeuvre that an aircraft has chosen, sent to those it is in conflict with.
 
     Parameters
     ----------
-    address : (rows,) of int
+    address : (entries,) of int
         Whose choice it is; of two, the lower one goes first.
-    side : (rows,) of int
+    side : (entries,) of int
         1 to the right or up, -1 to the left or down.
+    meant_for : (entries,) of int
+        Address of the other one of the conflict; nobody else is bound by it.
     """
 
-    row_table = "sides"
+    entry_table = "sides"
 
-    address: IntArray = column("", "", "address of who chose", "int64", of=PER_ROW)
-    side: IntArray = column(
-        "", "", "1: to the right, or up; -1: to the left, or down", "int64", of=PER_ROW
+    offsets: IntArray
+    address: IntArray = column("", "", "address of who chose", "int64")
+    side: IntArray = column("", "", "1: to the right, or up; -1: to the left, or down", "int64")
+    meant_for: IntArray = column(
+        "", "", "address of the other one of the conflict, who alone is bound by it", "int64"
     )
 
     @classmethod
-    def at_rows(cls, instants: RunTicks, address: int, sides: Mapping[int, int]) -> Self | None:
-        """Return the sides chosen at some instants, by these' positions; None without any."""
-        rows = sorted(row for row, side in sides.items() if side)
-        if not rows:
+    def at_rows(
+        cls, instants: RunTicks, address: int, side: IntArray, row: IntArray, meant_for: IntArray
+    ) -> Self | None:
+        """Return the sides chosen at some instants (0: none), each for whom some rows name.
+
+        None without any.
+        """
+        told = side[row] != 0
+        pairs = np.unique(np.stack([row[told], meant_for[told]]), axis=1)
+        if not pairs.size:
             return None
-        some = instants.take(np.array(rows))
-        chosen = np.array([sides[row] for row in rows], dtype=np.int64)
-        return cls(some.tick, np.full(len(rows), address), chosen).of_runs(some.run)
+        rows, line = np.unique(pairs[0], return_inverse=True)
+        some, offsets = instants.take(rows), offsets_of(line, len(rows))
+        return cls(
+            some.tick, offsets, np.full(len(line), address), side[pairs[0]], pairs[1], run=some.run
+        )

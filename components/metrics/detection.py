@@ -26,17 +26,17 @@ from components.metrics.rows import (
     values_of_targets,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.replicas.times_out import blocks_that_may_be_out, times_out
+from dsa_des.replicas.times_out import blocks_with_outages, outage_times_of_replicas
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import (
     EVENT,
     FRACTION,
     NUMBER,
     SHARE,
+    ChangeWords,
     Group,
     Result,
-    Told,
-    recorded_by,
+    blocks_recording,
 )
 
 ANY = "any"
@@ -53,7 +53,7 @@ class FirstDetection(TargetMetric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        fusions = recorded_by(scene, FUSED)
+        fusions = blocks_recording(scene, FUSED)
         self.names = sensors_of(scene, parameters.sensors, [FUSED] if fusions else [])
         self.fusion = fusions[0] if fusions else None
         #: Delay (s) from each block to the fusion.
@@ -73,15 +73,17 @@ class FirstDetection(TargetMetric):
             results += [
                 Result(
                     f"detected.{name}", EVENT, f"whether {label} reports the target at all",
-                    told=Told(label, "no longer sees any target", "now sees a target"), block=block,
+                    told=ChangeWords(label, "no longer sees any target", "now sees a target"),
+                    block=block,
                 ),
                 Result(
                     f"first_detection_time_s.{name}", NUMBER, time, cut,
-                    Told(label, "sees a target earlier", "sees a target later"), block, least=0.0,
+                    ChangeWords(label, "sees a target earlier", "sees a target later"), block,
+                    least=0.0,
                 ),
                 Result(
                     f"first_detection_range_m.{name}", NUMBER, "true slant range then, m", cut,
-                    Told(label, "first sees it nearer", "first sees it farther away"), block,
+                    ChangeWords(label, "first sees it nearer", "first sees it farther away"), block,
                     least=0.0,
                 ),
             ]  # fmt: skip
@@ -164,7 +166,7 @@ class DetectionShare(TargetMetric):
         """Return one share per sensor, and how long each that may be out was."""
         meaning = "detections per look at a target in reach"
         shares = [Result(f"detection_share.{name}", SHARE, meaning) for name in self.names]
-        out = sorted(set(self.names).intersection(blocks_that_may_be_out(self.scene)))
+        out = sorted(set(self.names).intersection(blocks_with_outages(self.scene)))
         meaning = "share of the run in which it was out"
         return [*shares, *(Result(f"out_share.{name}", FRACTION, meaning) for name in out)]
 
@@ -182,7 +184,9 @@ class DetectionShare(TargetMetric):
             rows = detections
             successes = np.bincount(rows["replica"][hits], minlength=len(group))
             values |= share_columns(f"detection_share.{name}", successes, trials)
-        for name, spans in times_out(group.scene, group.replicas, group.duration_s).items():
+        for name, spans in outage_times_of_replicas(
+            group.scene, group.replicas, group.duration_s
+        ).items():
             if name in self.names:
                 out_s = np.array([(each[:, 1] - each[:, 0]).sum() for each in spans])
                 values[f"out_share.{name}"] = out_s / group.duration_s
@@ -232,11 +236,13 @@ class Declaration(TargetMetric):
             results += [
                 Result(
                     f"declared.{name}", EVENT, "whether the target is declared",
-                    told=Told(label, "no longer declares any target", "now declares a target"),
+                    told=ChangeWords(label, "no longer declares any target",
+                    "now declares a target"),
                 ),
                 Result(
                     f"declaration_time_s.{name}", NUMBER, "first declaration, s", cut,
-                    Told(label, "declares a target earlier", "declares a target later"), least=0.0,
+                    ChangeWords(label, "declares a target earlier", "declares a target later"),
+                    least=0.0,
                 ),
                 Result(
                     f"declaration_range_m.{name}", NUMBER, "true slant range then, m", cut,

@@ -32,9 +32,9 @@ from components.metrics.rows import (
 from components.metrics.separation import RelativeFlight, traffic_block
 from components.well_clear.volume import PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
-from dsa_des.replicas.times_out import blocks_that_may_be_out, is_out_between, times_out
+from dsa_des.replicas.times_out import blocks_with_outages, is_out_between, outage_times_of_replicas
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import EVENT, NUMBER, RATIO, Group, RatioOf, Result, recorded_by
+from dsa_des.studies.metric import EVENT, NUMBER, RATIO, Group, RatioOf, Result, blocks_recording
 
 #: By what an approach may be censored, see `components.flights.closest_approach.end_of_look`.
 _ENDS = ("", START, END, "the start of its flight", "the end of its flight")
@@ -240,7 +240,7 @@ def _blocks_before(scene: Scene, block: str) -> list[str]:
     """
     graph = scene.graph.copy()
     graph.remove_edges_from(list(graph.in_edges(traffic_block(scene).name)))
-    return sorted({block, *nx.ancestors(graph, block)}.intersection(blocks_that_may_be_out(scene)))
+    return sorted({block, *nx.ancestors(graph, block)}.intersection(blocks_with_outages(scene)))
 
 
 def _least_over_time(values: FloatArray, counts: BoolArray | None = None) -> FloatArray:
@@ -313,7 +313,7 @@ class AlertTimes(FlownMetric):
         traffic = traffic_block(scene).name
         #: Whether losses are of what was flown, so that a run that ended early has no later ones.
         self._as_flown = parameters.steered or all(w.target != traffic for w in scene.wires)
-        self._blocks = self.select_on_platform(recorded_by(scene, "alerts"))
+        self._blocks = self.select_on_platform(blocks_recording(scene, "alerts"))
         #: Which blocks may be out behind each of them that has any.
         self._behind = {name: of for name in self._blocks if (of := _blocks_before(scene, name))}
 
@@ -379,7 +379,8 @@ class AlertTimes(FlownMetric):
                 values[f"alert_{what}.{name}"] = event.any(axis=1).astype(float)
             if name in self._behind:
                 out = group.cached(
-                    times_out, lambda: times_out(group.scene, group.replicas, group.duration_s)
+                    outage_times_of_replicas,
+                    lambda: outage_times_of_replicas(group.scene, group.replicas, group.duration_s),
                 )
                 due = is_out_between(out, self._behind[name], lost_s - self.p.late_s, lost_s)
                 event = (missed & due).any(axis=1)

@@ -19,10 +19,10 @@ from components.metrics.separation import (
     traffic_of,
 )
 from components.metrics.true_states import Coverage
-from dsa_des.arrays.keyed_table import turns
+from dsa_des.arrays.keyed_table import occurrences_by_turn
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
-from dsa_des.scene.platforms import platforms_of
+from dsa_des.scene.platforms import platform_by_block
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import Group, Metric
 
@@ -68,7 +68,7 @@ def flown_as_steered(own: Sequence[Any], told: Sequence[ManoeuvresTold]) -> list
         return []
     number = np.repeat(np.arange(len(told)), [len(one.came_s) for one in told])
     time_s, given = (np.concatenate(parts) for parts in list(zip(*told, strict=True))[1::2])
-    for one in turns(number):  # the first of each aircraft, then the next
+    for one in occurrences_by_turn(number):  # the first of each aircraft, then the next
         flights = flights.add_manoeuvres(number[one], time_s[one], given[one])
     return list(flights)
 
@@ -96,7 +96,7 @@ class FlownMetric(TargetMetric):
             any_two = named == "*" and self.of_any_two
             if named is not None and named not in names and not any_two:
                 raise ValueError(f"platform: there is no {named!r}{did_you_mean(named, names)}")
-            carrying = platforms_of(scene, {traffic: names})
+            carrying = platform_by_block(scene, {traffic: names})
             self._on = {block: names.index(on) - 1 for block, on in carrying.items()}
             if any_two:
                 self.viewer = ANY_TWO

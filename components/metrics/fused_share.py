@@ -26,10 +26,10 @@ from components.metrics.rows import (
     share_columns,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.block.component import ends_its_run
+from dsa_des.block.component import may_end_its_run
 from dsa_des.block.message import Text
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import SHARE, Group, Result, recorded_by
+from dsa_des.studies.metric import SHARE, Group, Result, blocks_recording
 from dsa_des.time.clock import ClockSpec, ScanClock
 
 #: Beyond so many standard deviations nothing is expected to happen.
@@ -51,7 +51,7 @@ class FusedShare(TargetMetric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        self.fusion = recorded_by(scene, FUSED)[0]
+        self.fusion = blocks_recording(scene, FUSED)[0]
         fed = {wire.source for wire in scene.wires if wire.target == self.fusion}
         names = [name for name in sensors_of(scene, parameters.sensors) if name in fed]
         if len(names) < 2:
@@ -125,7 +125,7 @@ def _expected_share(
     (own, delay_s), (theirs, other_delay_s) = one, other
     if any(clock.jitter_s or clock.rate_error_ppm for clock in (own, theirs)):
         # How long a run is that a block may end is not known before it.
-        if scene.duration_s is None or any(ends_its_run(b.cls) for b in scene.blocks.values()):
+        if scene.duration_s is None or any(may_end_its_run(b.cls) for b in scene.blocks.values()):
             return None
         return mean_coincidence_share(
             own,

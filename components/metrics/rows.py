@@ -12,7 +12,7 @@ from dsa_des.block.component import Component, Parameters
 from dsa_des.block.message import Columns, Text
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import NUMBER, TRIALS, Group, Metric, Result, recorded_by
+from dsa_des.studies.metric import NUMBER, TRIALS, Group, Metric, Result, blocks_recording
 
 #: How the two ends of a run are called.
 START, END = "the start", "the end of the run"
@@ -88,7 +88,7 @@ def numbers(meanings: Mapping[str, str]) -> list[Result]:
 
 def sensors_of(scene: Scene, chosen: Sequence[str] | None, extra: Sequence[str] = ()) -> list[str]:
     """Return the sensors to measure: those chosen, or all, and `extra` names."""
-    known = [*recorded_by(scene, "detections"), *extra]
+    known = [*blocks_recording(scene, "detections"), *extra]
     for name in chosen or ():
         if name not in known:
             raise ValueError(f"sensors: {name!r} reports nothing{did_you_mean(name, known)}")

@@ -22,7 +22,7 @@ from components.metrics.rows import (
 from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import FRACTION, Group, Result, recorded_by
+from dsa_des.studies.metric import FRACTION, Group, Result, blocks_recording
 from dsa_des.time.clock import ClockSpec
 
 
@@ -86,7 +86,7 @@ class AgeOfInformation(TargetMetric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        self.fusion = recorded_by(scene, FUSED)[0]
+        self.fusion = blocks_recording(scene, FUSED)[0]
 
     def results(self) -> list[Result]:
         """Return mean and 95th percentile."""
@@ -228,7 +228,7 @@ class TrackUpdates(TargetMetric):
 
     def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
         """Return the mean interval for a single sensor that detects in every scan not lost."""
-        fusion = recorded_by(scene, FUSED)
+        fusion = blocks_recording(scene, FUSED)
         feed = only_feed(scene, fusion[0]) if len(fusion) == 1 else None
         onward = [wire for wire in scene.wires if wire.source in fusion]
         if feed is None or any(wire.jitter_s or wire.drop_probability for wire in onward):
@@ -294,7 +294,7 @@ def only_feed(scene: Scene, block: str) -> Feed | None:
     """
     sensors = {
         name
-        for name in recorded_by(scene, "detections")
+        for name in blocks_recording(scene, "detections")
         if getattr(scene.blocks[name].parameters, "enabled", True)
     }
     wires = [wire for wire in scene.wires if wire.target == block and wire.source in sensors]

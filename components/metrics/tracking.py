@@ -15,7 +15,7 @@ from components.metrics.true_states import Coverage, states_in_frame
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.metric import FRACTION, NUMBER, Group, Result, recorded_by
+from dsa_des.studies.metric import FRACTION, NUMBER, Group, Result, blocks_recording
 
 _TABLE = "state_tracks"
 _MOST_STRETCHES = 400
@@ -113,7 +113,7 @@ class Tracking(PlatformTracks):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        known, block = self.blocks_on_board(recorded_by(scene, _TABLE)), self.p.block
+        known, block = self.blocks_on_board(blocks_recording(scene, _TABLE)), self.p.block
         if block is not None and block not in known:
             raise ValueError(f"block: {block!r} tells no tracks{did_you_mean(block, known)}")
         self._ends_s: list[float] = []

@@ -12,7 +12,7 @@ from components.guidance.daidalus import ConfParameters, changes_out_of_bands, e
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.operator.pilot_model import Draws, mean_pause_s, pause_s, response_s, steering
-from dsa_des.arrays.keyed_table import turns
+from dsa_des.arrays.keyed_table import occurrences_by_turn
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
@@ -168,7 +168,9 @@ class Stochastic(Component):
         choosing: list[tuple[int, Mind]] = []
         acting: list[tuple[int, int]] = []
         has_to_do = np.flatnonzero(self._has_to_do(wake, highest))
-        for turn in turns(runs[has_to_do]):  # the first row of every run, then the next
+        for turn in occurrences_by_turn(
+            runs[has_to_do]
+        ):  # the first row of every run, then the next
             rows = has_to_do[turn]
             minds = [self._minds.get(run, Mind(run)) for run in runs[rows].tolist()]
             chooses, acts = self._follow(minds, wake.ticks[rows], highest[rows].tolist())

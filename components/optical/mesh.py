@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from components.aircraft.aspect_tables import SilhouetteTable
 from components.arguments.checks import finite
 from dsa_des.arrays.types import FloatArray
-from dsa_des.files.input_files import InputFileError, status_of
+from dsa_des.files.input_files import InputFileError, readable_file_status
 from dsa_des.text.safe_text import shorten
 
 DEFAULT_ROWS = 1024
@@ -156,7 +156,7 @@ def load_mesh(
     if not log.handlers:
         log.addHandler(logging.NullHandler())
     try:
-        status_of(Path(path))
+        readable_file_status(Path(path))
         with np.errstate(all="ignore"):  # numbers that are none are refused below
             loaded: Any = trimesh.load(str(path), force="mesh")
             loaded.merge_vertices(merge_tex=True, merge_norm=True)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import angle, broadcast_flat, check_not_negative, unflatten
 from components.geometry import sine_and_cosine
-from dsa_des.arrays.column_values import one_row
+from dsa_des.arrays.column_values import first_row_if_constant
 from dsa_des.arrays.types import FloatArray
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def line_of_sight_in_target_axes(
     sin_roll, cos_roll = sine_and_cosine(roll_rad)
     sin_elevation, cos_elevation = np.sin(elevation_rad), np.cos(elevation_rad)
     m = 0.0 - sin_elevation  # of one that flies level
-    if one_row(pitch_rad).any():
+    if first_row_if_constant(pitch_rad).any():
         leaving = cos_yaw >= 0.0
         tilt = np.sin(np.where(leaving, pitch_rad - elevation_rad, pitch_rad + elevation_rad))
         side = 2.0 * sin_pitch * cos_elevation

@@ -15,7 +15,7 @@ import numpy as np
 from components.geometry import body_to_ned, unit_vector
 from components.messages.detections import REPORT, Detections, ReportTransform
 from components.sensor.look import DECLARATION, Cells, Judging, Look
-from dsa_des.arrays.run_ticks import RunTicks, next_of_run
+from dsa_des.arrays.run_ticks import RunTicks, next_position_in_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 
@@ -181,8 +181,8 @@ def scans_with_company(
     neighbours: _Neighbours | None = None
     for lag in range(1, n):
         scans, wanted = RunTicks(places.run, places.scan), places.scan[asked] - lag
-        first = next_of_run(scans, RunTicks(places.run[asked], wanted))
-        number = next_of_run(scans, RunTicks(places.run[asked], wanted + 1)) - first
+        first = next_position_in_run(scans, RunTicks(places.run[asked], wanted))
+        number = next_position_in_run(scans, RunTicks(places.run[asked], wanted + 1)) - first
         pairs = _enumerate_pairs(first, number)
         if int(number.sum()) > _FEW_PAIRS:
             neighbours = neighbours or _Neighbours(places, rate_rad_s)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry import TWO_PI, remainder, unwrap_sector, wrap_pi
-from dsa_des.arrays.column_values import constant, null_column
+from dsa_des.arrays.column_values import constant_column, null_column
 from dsa_des.arrays.types import FloatArray
 
 # A limit that misses a grid point by no more than this share of itself counts as lying on it: 110
@@ -222,7 +222,9 @@ class SensorGrid:
         if "range_rate" in where:
             values["range_rate"] = self._rate_grid.round(where["range_rate"])
         count = len(values["azimuth"])
-        return values, {name: constant(v, count, np.float64) for name, v in self.variances.items()}
+        return values, {
+            name: constant_column(v, count, np.float64) for name, v in self.variances.items()
+        }
 
     def round(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray

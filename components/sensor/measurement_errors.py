@@ -19,7 +19,7 @@ from components.sensor.grid import (
 )
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import StatedError
-from dsa_des.arrays.column_values import constant, null_column
+from dsa_des.arrays.column_values import constant_column, null_column
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.time.gauss_markov import GaussMarkov
@@ -180,7 +180,7 @@ class ErrorModel:
             if name in of_signal:
                 variance = value + of_signal[name]
             else:
-                variance = constant(value, count, np.float64)
+                variance = constant_column(value, count, np.float64)
             if name in self._shares:
                 variance = variance + self._shares[name] * values[name] ** 2
             columns[VARIANCE_OF[name]] = variance

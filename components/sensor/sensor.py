@@ -41,7 +41,7 @@ from components.sensor.measurement_errors import (
 from components.sensor.measuring import Measuring
 from components.sensor.mounting import AXES, Mounting
 from components.sensor.parameters import SensorParameters
-from dsa_des.arrays.column_values import constant
+from dsa_des.arrays.column_values import constant_column
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Input, Output
 from dsa_des.block.effect import Effect, Hook
@@ -95,7 +95,7 @@ def _count_per_row(mask: BoolArray) -> IntArray:
 
 
 def _counts_of_rows(count: int, rows: int) -> IntArray:
-    return constant(count, rows, np.int64)
+    return constant_column(count, rows, np.int64)
 
 
 #: Effects that every sensor has, after its own.

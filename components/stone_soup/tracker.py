@@ -23,9 +23,9 @@ from components.tracking.scans import Scans, scans_of, split_due_looks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
-from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
+from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
 from dsa_des.block.message import offsets_of
-from dsa_des.block.source_file import absolute
+from dsa_des.block.source_file import absolute_type_name
 from dsa_des.block.wake import Wake
 from dsa_des.time.randomness import key_of
 
@@ -38,7 +38,7 @@ def _builder(value: Any) -> Any:
     if file.endswith(".py") and "/" not in file:
         folder = getattr(value, "folder", None)
         value = f"./{value}" if folder is None else f"{folder}/{value}"
-    return absolute(value)
+    return absolute_type_name(value)
 
 
 class StoneSoupParameters(Parameters):
@@ -136,7 +136,7 @@ class StoneSoupTracker(Component):
         if not callable(build):
             raise ValueError(f"builder = {name}: is no function that builds a tracker")
         try:
-            with foreign_code(), self._repeatable.working():
+            with wrap_foreign_errors(), self._repeatable.working():
                 tracker = build()
         except ForeignFailure as error:
             raise ValueError(f"builder = {name}: failed with {error}") from error.__cause__

@@ -11,7 +11,12 @@ from dsa_des.block.message import Column, columns
 
 #: What an aircraft says; null, or -1 of a category, where it does not.
 REPORTED = {
-    "address": Column("", "", "24-bit ICAO address; -1 of a Mode C reply, which has none", "int64"),
+    "address": Column(
+        "",
+        "",
+        "24-bit ICAO address; -1 of a Mode C reply; 0 of other sensors, as nacp to nic",
+        "int64",
+    ),
     "reported_lat_deg": Column("deg", WGS84, "latitude as decoded, at reported_s"),
     "reported_lon_deg": Column("deg", WGS84, "longitude as decoded, at reported_s"),
     "reported_alt_m": Column("m", "pressure altitude", "altitude as reported, in 25 or 100 ft"),

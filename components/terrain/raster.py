@@ -22,7 +22,7 @@ from components.geometry import RAD_PER_DEG, radii_of_curvature, remainder
 from components.terrain.voids import MOST_VOIDS, fill_voids
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
-from dsa_des.files.input_files import InputFileError, read_once, status_of
+from dsa_des.files.input_files import InputFileError, cache_reads, readable_file_status
 from dsa_des.text.safe_text import shorten
 
 # Longitudes are met to this share of a step at the raster's edges: a degree is not exact in them.
@@ -329,7 +329,7 @@ def _read_geotiff(path: Path, name: str) -> ElevationRaster:
 
 
 #: Runs of a study that name the same file share one raster.
-_read_once = read_once(8)(read_raster)
+_read_once = cache_reads(8)(read_raster)
 
 
 @lru_cache(maxsize=2)
@@ -347,7 +347,7 @@ def _validate(value: Any) -> RasterOfFile:
         path = _PATH.validate_python(item)
         name = shorten(str(path), 300)
         try:
-            status_of(path, LARGEST_RASTER_BYTES)
+            readable_file_status(path, LARGEST_RASTER_BYTES)
             rasters.append(_read_once(path))
         except InputFileError as error:
             raise ValueError(f"must be a raster that can be read: {name}: {error}") from None

@@ -13,7 +13,7 @@ from components.display.symbols import add_grid, styles_of
 from components.sensor import marks
 from components.thesis.scenes import SceneRun
 from dsa_des.arrays.types import AnyArray, FloatArray
-from dsa_des.record.drawing import drawing
+from dsa_des.record.drawing import draw_to_png
 
 #: Half a page.
 WIDTH_IN, HEIGHT_IN = 6.6, 3.9
@@ -42,7 +42,7 @@ def panels(
     **shared: Any,
 ) -> Iterator[list[Any]]:
     """Yield the axes of a figure, row by row, and write it as PNG when the block is done."""
-    with drawing(width_in, height_in, path) as figure:
+    with draw_to_png(width_in, height_in, path) as figure:
         figure.set_layout_engine("constrained")
         axes = list(figure.subplots(rows, columns, squeeze=False, **shared).flat)
         for one in axes:

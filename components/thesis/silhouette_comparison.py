@@ -26,7 +26,7 @@ from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.output_names import user_path
-from dsa_des.record.drawing import drawing, figure_text
+from dsa_des.record.drawing import draw_to_png, figure_text
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.terminal.interruption import plain_ending
@@ -160,7 +160,7 @@ def draw_comparison(
     comparisons: Sequence[RotationComparison], path: str | PathLike[str], *, title: str = ""
 ) -> None:
     """Draw three panels like figs 4.8-4.10, one per axis of rotation, into an image file."""
-    with drawing(7.0, 9.0, Path(path), dpi=150) as figure:
+    with draw_to_png(7.0, 9.0, Path(path), dpi=150) as figure:
         figure.set_layout_engine("constrained")
         panels = figure.subplots(3, 1, sharex=True, sharey=True)
         for panel, axis in zip(panels, AXES, strict=True):

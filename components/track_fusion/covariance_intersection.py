@@ -30,8 +30,8 @@ from components.track_fusion.track_association import (
     leaders,
     match_tracks,
 )
-from dsa_des.arrays.keyed_table import KeyedTable, turns
-from dsa_des.arrays.run_ticks import last_of_run
+from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
+from dsa_des.arrays.run_ticks import last_position_in_run
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -178,7 +178,9 @@ class CovarianceIntersection(Component):
         came = {
             new.source: self._select_newest_reports(new, wake) for new in wake.arrivals("tracks")
         }
-        row_of = {name: last_of_run(wake.instants, new.instants) for name, new in came.items()}
+        row_of = {
+            name: last_position_in_run(wake.instants, new.instants) for name, new in came.items()
+        }
         rows = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *row_of.values()]))
         if len(rows) == 0:
             return None
@@ -190,7 +192,7 @@ class CovarianceIntersection(Component):
             self._reported.rows_of_runs(records.replica),
         )
         parts = []
-        for at in turns(replica):
+        for at in occurrences_by_turn(replica):
             local, records = self._take_in(
                 local, records, new.take(np.isin(new.row, rows[at])), reported_at, rows[at],
                 replica[at],

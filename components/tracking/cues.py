@@ -13,7 +13,7 @@ from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.cues import CueCones
 from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks, full_covariance
 from components.sensor.marks import TRACKER
-from dsa_des.arrays.keyed_table import turns
+from dsa_des.arrays.keyed_table import occurrences_by_turn
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.message import offsets_of
@@ -114,7 +114,7 @@ class Cues(Component):
             self._last_tick = np.append(self._last_tick, np.full(more, -self._every_ticks))
             self._silent = np.append(self._silent, np.ones(more, dtype=bool))
         due = np.zeros(len(tick), dtype=bool)
-        for rows in turns(run):
+        for rows in occurrences_by_turn(run):
             of = run[rows]
             now = (tick[rows] - self._last_tick[of] >= self._every_ticks) & (
                 some[rows] | ~self._silent[of]

@@ -27,7 +27,7 @@ from components.messages.state_tracks import DELETED
 from components.tracking.scans import LookBatch
 from components.tracking.track_store import NEVER, TrackStore, tracks_to_report
 from dsa_des.arrays.keyed_table import KeyedTable
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run, next_of_run
+from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run, next_position_in_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: A track lives without a detection for so long, s, and for so many promises of its sensors.
@@ -180,15 +180,15 @@ class Silence:
         run, since = at.run[order], worked.copy()
         again = run[1:] == run[:-1]
         since[order[1:][again]] = at.tick[order[:-1][again]]
-        return self._first_silent(at.run, since), last_of_run(self.silent_instants, at)
+        return self._first_silent(at.run, since), last_position_in_run(self.silent_instants, at)
 
     def silence_after_work(self, run: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
         """Return the silent rows of some runs from their last work on."""
-        ends = next_of_run(self.silent_instants, RunTicks(run + 1, np.zeros_like(run)))
+        ends = next_position_in_run(self.silent_instants, RunTicks(run + 1, np.zeros_like(run)))
         return self._first_silent(run, worked), ends - 1
 
     def _first_silent(self, run: IntArray, worked: IntArray) -> IntArray:
-        return next_of_run(self.silent_instants, RunTicks(run, worked + self.ticks_per_s))
+        return next_position_in_run(self.silent_instants, RunTicks(run, worked + self.ticks_per_s))
 
     def end_silent_tracks(
         self, store: TrackStore, records: KeyedTable, first: IntArray, last: IntArray
@@ -201,7 +201,8 @@ class Silence:
         index = np.minimum(records.replica.searchsorted(store.replica), len(records) - 1)
         over = store.updated_tick + store.life_ticks + self.late_ticks
         row = np.maximum(
-            next_of_run(self.silent_instants, RunTicks(store.replica, over + 1)), first[index]
+            next_position_in_run(self.silent_instants, RunTicks(store.replica, over + 1)),
+            first[index],
         )
         due = (records.replica[index] == store.replica) & (store.status != DELETED)
         due &= row <= last[index]

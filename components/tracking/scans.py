@@ -13,7 +13,7 @@ from components.estimation.measurement import Kind
 from components.messages.columns import POSE, TOLD
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.entries import row_of_entries
-from dsa_des.arrays.run_ticks import RunTicks, next_of_run
+from dsa_des.arrays.run_ticks import RunTicks, next_position_in_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
@@ -261,7 +261,7 @@ def split_due_looks(
     if ahead is not None:
         scans = Scans.concatenate([replace(ahead, row=np.full(len(ahead), -1)), scans])
     due = RunTicks(scans.run, scans.tick + wait_ticks)
-    row = np.maximum(scans.row, next_of_run(wake.instants, due))
+    row = np.maximum(scans.row, next_position_in_run(wake.instants, due))
     there = np.minimum(row, len(wake) - 1)
     ready = (row < len(wake)) & (wake.run[there] == scans.run)
     waiting = ~ready & (scans.run >= wake.first_run)

@@ -40,7 +40,7 @@ from components.tracking.rules import TrackerParameters, TrackerRules, range_rat
 from components.tracking.scans import LookBatch, Scans, scans_of, split_due_looks
 from components.tracking.step import late_step, step
 from components.tracking.track_store import TrackStore, records_of, state_tracks, tracks_to_report
-from dsa_des.arrays.keyed_table import KeyedTable, turns
+from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
@@ -274,7 +274,7 @@ class Tracker(Component):
         records.worked_tick[plan.of] = wake.ticks[row]
         # Tracks as last shown, of runs in a row that brings several works: one may end in between.
         shown_last, begins = store.take(_NO_ROWS), plan.begins
-        for works in turns(plan.of):
+        for works in occurrences_by_turn(plan.of):
             if len(store) and bool((first[works] <= last[works]).any()):
                 asked = records.take(plan.of[works])
                 store, more = silence.end_silent_tracks(store, asked, first[works], last[works])

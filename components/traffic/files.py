@@ -22,7 +22,7 @@ from components.traffic.recorded import (
 )
 from components.traffic.scripted import Ownship, flight_of
 from dsa_des.block.component import Parameters, ScenePath
-from dsa_des.files.input_files import is_folder, read_once
+from dsa_des.files.input_files import cache_reads, is_folder
 
 
 class Box(Parameters):
@@ -238,5 +238,5 @@ def traffic_of(parameters: FileTrafficParameters, geoid_m: float = 0.0) -> Traff
 #: Earlier names of what reads files of any kind.
 CsvFile = AsterixFile = FileTraffic
 
-_read = read_once(4)(read_traffic)
-_read_daa = read_once(4)(read_daa)
+_read = cache_reads(4)(read_traffic)
+_read_daa = cache_reads(4)(read_daa)

@@ -8,8 +8,8 @@ import numpy as np
 
 from components.flights.many_flights import SteeredFleet
 from components.messages.steering import Manoeuvre
-from dsa_des.arrays.keyed_table import KeyedTable, turns
-from dsa_des.arrays.run_ticks import RunTicks, next_of_run
+from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
+from dsa_des.arrays.run_ticks import RunTicks, next_position_in_run
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Producer
 from dsa_des.block.wake import Wake
@@ -77,7 +77,9 @@ def due_manoeuvres(wake: Wake, pending: Coming) -> tuple[Coming, Coming]:
     """
     pending = pending.take(np.lexsort((pending.platform, pending.tick, pending.replica)))
     came = pending.instants
-    row = next_of_run(wake.instants, came)  # the first that flies it, if it is of its ownship
+    row = next_position_in_run(
+        wake.instants, came
+    )  # the first that flies it, if it is of its ownship
     due = (row < len(wake)) & (wake.run[np.minimum(row, len(wake) - 1)] == came.run)
     return pending.take(due), pending.take(~due)
 
@@ -91,7 +93,7 @@ def steer(
     come by its own instant, whatever came later in this wake.
     """
     known: IntArray = fleet.manoeuvre_count[each]
-    for one in turns(flights):  # the first of every flight, then the next
+    for one in occurrences_by_turn(flights):  # the first of every flight, then the next
         ticks = due.tick[one]
         fleet = fleet.add_manoeuvres(
             flights[one], ticks / wake.ticks_per_s, due.manoeuvre[:, one].T

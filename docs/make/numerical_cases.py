@@ -16,7 +16,7 @@ from components.geometry import (
 )
 from components.high_precision.multiprecision import multiprecision
 from components.sensor.grid import Grid
-from dsa_des.time.clock import ClockSpec, ScanClock, parse_rational, resolution
+from dsa_des.time.clock import ClockSpec, ScanClock, common_ticks_per_second, parse_rational
 
 DIGITS = 12
 
@@ -218,7 +218,7 @@ def _meetings(
     what: str, formula: str, naive: int, rates: tuple[object, object], truth: int
 ) -> NumericalCase:
     specs = [ClockSpec(parse_rational(rate)) for rate in rates]
-    ticks_per_s = resolution([time for spec in specs for time in spec.exact_times()])
+    ticks_per_s = common_ticks_per_second([time for spec in specs for time in spec.exact_times()])
     scans = [ScanClock(spec, ticks_per_s).between(0, _HOUR_S * ticks_per_s)[1] for spec in specs]
     ours = np.intersect1d(scans[0], scans[1]).size
     return NumericalCase(what, formula, naive, ours, truth, "rational numbers")
@@ -251,7 +251,7 @@ def _firings() -> NumericalCase:
         if time_s - last >= 1.0 / 5.0:
             fired, last = fired + 1, time_s
     spec = ClockSpec(Fraction(5))
-    ticks_per_s = resolution(spec.exact_times())
+    ticks_per_s = common_ticks_per_second(spec.exact_times())
     ours = ScanClock(spec, ticks_per_s).between(0, 1000 * ticks_per_s)[0].size
     return NumericalCase(
         "5 Hz for 1000 s: scans",

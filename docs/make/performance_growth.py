@@ -87,9 +87,9 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     """Draw cost against what grows, and memory against simulated time."""
     from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
-    from dsa_des.record.drawing import drawing
+    from dsa_des.record.drawing import draw_to_png
 
-    with drawing(8.5, 6.0, path) as figure:
+    with draw_to_png(8.5, 6.0, path) as figure:
         panels = figure.subplots(2, 2)
         for panel, axis in zip(panels.flat, AXES, strict=True):
             chosen = [row for row in rows if row["axis"] == axis]

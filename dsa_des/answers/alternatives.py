@@ -12,16 +12,16 @@ from typing import Any
 from dsa_des.block.ladder import Ladder, Rung, Unavailable
 from dsa_des.errors import BlockFailure, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.record.recording import Recorder
-from dsa_des.replicas.changed_scene import scene_of
-from dsa_des.results.labels import short
+from dsa_des.replicas.changed_scene import replica_scene
+from dsa_des.results.labels import short_text
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.keys import Key, key_in
+from dsa_des.scene.keys import Key, parse_key_path
 from dsa_des.scene.overrides import SWAP, parse_assignment, parse_value
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.axes import Axis, parse_axis
 from dsa_des.studies.metric import check_recorded
 from dsa_des.studies.study import Study
-from dsa_des.studies.study_checks import one_per_value
+from dsa_des.studies.study_checks import cells_covering_values
 
 COLUMN, AS_IT_IS = "model", "as it is"
 #: Lets the engine choose models by itself; here a model must be what it is called.
@@ -56,7 +56,7 @@ class Alternatives:
     scenes: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
 
 
-def comparable(study: Study) -> tuple[Study, list[str]]:
+def make_comparable_study(study: Study) -> tuple[Study, list[str]]:
     """Return a study whose runs can be paired with those of other models, and notes on changes."""
     notes = []
     base = study.base.copy()
@@ -76,7 +76,7 @@ def comparable(study: Study) -> tuple[Study, list[str]]:
     return plain, notes
 
 
-def with_models(study: Study, alternatives: Sequence[Alternative]) -> Study:
+def add_model_axis(study: Study, alternatives: Sequence[Alternative]) -> Study:
     """Return the study with one more axis: the scene as it is, and each alternative."""
     every = [Alternative(AS_IT_IS), *alternatives]
     axis = Axis(
@@ -96,46 +96,46 @@ def find_alternatives(
     `listed` are texts ``KEY=VALUE`` or ``KEY=[VALUE, ...]``, as ``--set`` and axes have them.
     """
     found = Alternatives([], [], [], [])
-    cells = _cells(study)
+    cells = _cells_of_all_values(study)
     scenes = {cell: study.scene(cell) for cell in cells}
     known = {name for scene in scenes.values() for name in scene.blocks}
     if block is not None and block not in known:
         raise UsageError(
             f"--block {block}: the scene has no such block{did_you_mean(block, sorted(known))}"
         )
-    fixed = _keys_of_study(study)
-    for name, ladder, at in _ladders(study, scenes, block, found):
+    fixed = _keys_varied_by_study(study)
+    for name, ladder, at in _effective_ladders(study, scenes, block, found):
         for rung in ladder.rungs:
             label = f"{name} {ladder.name}: {rung.name}"
             try:
-                alternative = _of_rung(study, label, name, ladder, rung, at)
-                _refuse_fixed(study, alternative, fixed)
+                alternative = _rung_as_alternative(study, label, name, ladder, rung, at)
+                _refuse_varied_keys(study, alternative, fixed)
             except Unavailable as error:
                 found.unavailable.append((label, str(error)))
                 continue
-            _try(study, alternative, cells, answers, found)
+            _sort_alternative(study, alternative, cells, answers, found)
     for text in listed:
         before = len(found.unavailable)
         some = _list_alternatives(study, text, scenes[cells[0]], fixed)
         for alternative in some:
-            _try(study, alternative, cells, answers, found)
+            _sort_alternative(study, alternative, cells, answers, found)
         wrong = found.unavailable[before:]
         if len(wrong) == len(some):
             raise UsageError(f"--vary {text}: {wrong[0][1]}")
     return found
 
 
-def _cells(study: Study) -> list[int]:
+def _cells_of_all_values(study: Study) -> list[int]:
     """Return cells that hold every value of every axis but those that are a sample."""
     sampled = [k for k, axis in enumerate(study.axes) if axis.column in study.over]
     return [
         cell
-        for cell in one_per_value(study)
+        for cell in cells_covering_values(study)
         if not any(study.indices(cell)[position] for position in sampled)
     ]
 
 
-def _ladders(
+def _effective_ladders(
     study: Study, scenes: Mapping[int, Scene], block: str | None, found: Alternatives
 ) -> list[tuple[str, Ladder, list[dict[str, Any]]]]:
     """Return ladders that change something, with the tables of their block in all scenes."""
@@ -143,7 +143,7 @@ def _ladders(
     why: dict[tuple[str, str], str] = {}
     tables: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for cell, scene in scenes.items():
-        components = Simulation(scene_of(scene, study.replica(0, cell))).components
+        components = Simulation(replica_scene(scene, study.replica(0, cell))).components
         written = scene.resolved()["blocks"]
         for name, one in scene.blocks.items():
             if name not in components:  # it is not enabled
@@ -164,14 +164,14 @@ def _ladders(
     return [(key[0], ladder, tables[key]) for key, ladder in declared.items() if not why[key]]
 
 
-def _of_rung(
+def _rung_as_alternative(
     study: Study, label: str, block: str, ladder: Ladder, rung: Rung, tables: list[dict[str, Any]]
 ) -> Alternative:
     """Return a rung as changes of a scene; Unavailable where one change is not enough for all."""
     for key in ladder.clears:
         written = study.base.data["blocks"].get(block, {}).get(key)
         if any(table.get(key) not in (None, _AUTO) for table in tables):
-            raise Unavailable(f"the scene says {block}.{key} = {short(tables[0].get(key))}; "
+            raise Unavailable(f"the scene says {block}.{key} = {short_text(tables[0].get(key))}; "
                               f"--vary blocks.{block}.{key}=... varies it")  # fmt: skip
         if written == _AUTO:
             del study.base.data["blocks"][block][key]
@@ -182,7 +182,7 @@ def _of_rung(
     numbers = {key: value for key, value in changes[0].items() if type(value) in (int, float)}
     if numbers and all(table["type"] == rung.type_name for table in tables):
         # The scene has this model with other numbers.
-        label += f" ({', '.join(f'{key} = {short(value)}' for key, value in numbers.items())})"
+        label += f" ({', '.join(f'{key} = {short_text(value)}' for key, value in numbers.items())})"
     sets += [(f"{table}.{key}", value) for table, keys in rung.sections.items()
              for key, value in keys.items()]  # fmt: skip
     return Alternative(label, tuple(sets), ((block, rung.type_name),) * bool(rung.type_name))
@@ -208,40 +208,44 @@ def _list_alternatives(
     ]
     try:
         for one in some:
-            _refuse_fixed(study, one, fixed)
+            _refuse_varied_keys(study, one, fixed)
     except Unavailable as error:
         raise UsageError(f"--vary {text}: {error}") from error
     return some
 
 
-def _keys_of_study(study: Study) -> dict[Key, str]:
+def _keys_varied_by_study(study: Study) -> dict[Key, str]:
     """Return the keys that the study itself varies, and what varies them."""
     tables = study.base.data
     fixed: dict[Key, str] = {}
     for axis in study.axes:
         for sets, swaps in zip(axis.sets, axis.swaps, strict=True):
-            fixed |= {key_in(tables, key): f"the study's axis {axis.column}" for key, _ in sets}
+            fixed |= {
+                parse_key_path(tables, key): f"the study's axis {axis.column}" for key, _ in sets
+            }
             fixed |= {("blocks", block, "type"): f"the study's axis {axis.column}"
                       for block, _ in swaps}  # fmt: skip
-    drawn = {key_in(tables, draw.key): f"the study's draw {draw.key}" for draw in study.draws}
+    drawn = {
+        parse_key_path(tables, draw.key): f"the study's draw {draw.key}" for draw in study.draws
+    }
     return fixed | drawn
 
 
-def _refuse_fixed(study: Study, alternative: Alternative, fixed: Mapping[Key, str]) -> None:
+def _refuse_varied_keys(study: Study, alternative: Alternative, fixed: Mapping[Key, str]) -> None:
     """Raise Unavailable for a model that sets what the study varies: all else must stay."""
-    keys: list[Key] = [key_in(study.base.data, key) for key, _ in alternative.sets]
+    keys: list[Key] = [parse_key_path(study.base.data, key) for key, _ in alternative.sets]
     keys += [("blocks", block, "type") for block, _ in alternative.swaps]
     for key in keys:
         if key in fixed:
             raise Unavailable(f"{fixed[key]} sets it")
 
 
-def _try(
+def _sort_alternative(
     study: Study, alternative: Alternative, cells: Sequence[int], answers: Sequence[str],
     found: Alternatives,
 ) -> None:  # fmt: skip
     """Set a model up in every scene, and put it where it belongs."""
-    two = with_models(study, [alternative])
+    two = add_model_axis(study, [alternative])
     owns, others = [], []
     for cell in cells:
         try:
@@ -250,9 +254,11 @@ def _try(
             others.append(other.resolved())
             if owns[-1] == others[-1]:
                 continue
-            _set_up(two, other, 2 * cell + 1, answers)
+            _check_runnable(two, other, 2 * cell + 1, answers)
         except SceneError as error:
-            found.unavailable.append((alternative.name, "; ".join(map(_brief, error.problems))))
+            found.unavailable.append(
+                (alternative.name, "; ".join(map(_short_problem_text, error.problems)))
+            )
             return
         except BlockFailure as error:
             found.unavailable.append((alternative.name, f"{error.block}: {error.reason}"))
@@ -270,12 +276,12 @@ def _try(
         found.notes.append(f"{alternative.name} is {twin}")
 
 
-def _set_up(study: Study, scene: Scene, cell: int, answers: Sequence[str]) -> None:
+def _check_runnable(study: Study, scene: Scene, cell: int, answers: Sequence[str]) -> None:
     """Raise an error unless a scene can run and its metrics give the answers."""
     metrics = [spec.build(scene) for spec in study.metrics]
     wanted = {table for metric in metrics for table in metric.tables}
     recorder = Recorder([], wanted=dict.fromkeys(wanted, ()))
-    blocks = Simulation(scene_of(scene, study.replica(0, cell)), recorder=recorder).components
+    blocks = Simulation(replica_scene(scene, study.replica(0, cell)), recorder=recorder).components
     for metric in metrics:
         check_recorded(metric, blocks)
         metric.check(blocks)
@@ -285,5 +291,5 @@ def _set_up(study: Study, scene: Scene, cell: int, answers: Sequence[str]) -> No
             raise ValueError(f"no metric gives {name} with it{did_you_mean(name, sorted(given))}")
 
 
-def _brief(problem: Problem) -> str:
+def _short_problem_text(problem: Problem) -> str:
     return f"{problem.key}: {problem.message}" if problem.key else str(problem.message)

@@ -14,7 +14,7 @@ import numpy as np
 
 from dsa_des.answers.alternatives import AS_IT_IS, COLUMN
 from dsa_des.arrays.types import AnyArray, IntArray
-from dsa_des.results.differences import EstimatedDifference, difference
+from dsa_des.results.differences import EstimatedDifference, estimate_difference
 from dsa_des.results.record import EVENT, RATIO, SHARE, TRIALS, Result
 from dsa_des.results.rows import Rows
 from dsa_des.results.statistics import Estimate
@@ -70,7 +70,7 @@ class PairedChange:
         return max(abs(self.difference.low), abs(self.difference.high))
 
 
-def confidence_of_each(confidence: float, comparisons: int) -> float:
+def confidence_per_interval(confidence: float, comparisons: int) -> float:
     """Return how sure each of some intervals must be for all to hold together."""
     return 1.0 - (1.0 - confidence) / max(1, comparisons)
 
@@ -79,7 +79,7 @@ def changes_by_model(
     rows: Rows, results: Sequence[Result], confidence: float, method: str, comparisons: int
 ) -> list[PairedChange]:
     """Return the change of every result by every model at every place, where both have runs."""
-    each = confidence_of_each(confidence, comparisons)
+    each = confidence_per_interval(confidence, comparisons)
     owns: dict[tuple[str, tuple[Any, ...]], Estimate] = {}
     changes = []
     for model, at, base, chosen in rows.comparisons_with_baseline(COLUMN, AS_IT_IS):
@@ -87,27 +87,29 @@ def changes_by_model(
             key = result.name, at
             if key not in owns:
                 owns[key] = rows.estimate(result, base, confidence, method)[0]
-            changes.append(_change(rows, result, str(model), at, owns[key], (base, chosen), each))
+            changes.append(
+                _estimate_change(rows, result, str(model), at, owns[key], (base, chosen), each)
+            )
     return changes
 
 
-def _change(
+def _estimate_change(
     rows: Rows, result: Result, model: str, at: tuple[Any, ...], own: Estimate,
     sides: tuple[IntArray, IntArray], confidence: float,
 ) -> PairedChange:  # fmt: skip
     pair = rows.common(*sides)
     runs = len(pair[0])
     differing = np.zeros(runs, dtype=bool)
-    for one, other in _columns(rows, result, pair):
-        differing |= ~((one == other) | (_is_nothing(one) & _is_nothing(other)))
+    for one, other in _paired_columns(rows, result, pair):
+        differing |= ~((one == other) | (_is_missing(one) & _is_missing(other)))
     cut_off, neither = np.zeros(runs, dtype=bool), 0
     if result.kind != RATIO:
-        missing = [_is_nothing(rows.column(result.name)[side]) for side in pair]
+        missing = [_is_missing(rows.column(result.name)[side]) for side in pair]
         neither = int((missing[0] & missing[1]).sum())
         if result.cut_off is not None:  # of what never comes nothing was cut off: it is lost
             for side, without in zip(pair, missing, strict=True):
-                cut_off |= ~_is_nothing(rows.column(result.cut_off)[side]) & ~without
-    found, reason, events = _difference(rows, result, pair, confidence)
+                cut_off |= ~_is_missing(rows.column(result.cut_off)[side]) & ~without
+    found, reason, events = _paired_difference(rows, result, pair, confidence)
     if not reason and math.isnan(found.paired.value):
         reason = "no run has a value with both"
     elif not reason and found.paired.count < 2:
@@ -118,7 +120,7 @@ def _change(
     if result.kind != RATIO and (found.only_first or found.only_second):
         _, first, second = rows.paired_values(result.name, *pair)
         has = [(~np.isnan(values)).astype(float) for values in (first, second)]
-        presence = difference(has[0], has[1], confidence, kind=EVENT).paired
+        presence = estimate_difference(has[0], has[1], confidence, kind=EVENT).paired
     return PairedChange(
         model, result, at, own, found.paired, runs, int(differing.sum()),
         found.only_first, found.only_second, neither, int(cut_off.sum()), presence,
@@ -126,7 +128,7 @@ def _change(
     )  # fmt: skip
 
 
-def _difference(
+def _paired_difference(
     rows: Rows, result: Result, pair: tuple[IntArray, IntArray], confidence: float
 ) -> tuple[EstimatedDifference, str, float]:
     """Return the paired difference, why there is none, and the events a ratio rests on if few."""
@@ -141,7 +143,7 @@ def _difference(
     return found, next((ratio.reason for ratio in ratios if ratio.reason), ""), few
 
 
-def _columns(
+def _paired_columns(
     rows: Rows, result: Result, pair: tuple[IntArray, IntArray]
 ) -> Iterator[tuple[AnyArray, AnyArray]]:
     """Give the columns that a result is made of, for both sides of all pairs of runs."""
@@ -155,7 +157,7 @@ def _columns(
         yield values[pair[0]], values[pair[1]]
 
 
-def _is_nothing(values: AnyArray) -> AnyArray:
+def _is_missing(values: AnyArray) -> AnyArray:
     """Return whether each is a missing number or a missing text."""
     if values.dtype == object:
         return np.array([value is None for value in values.tolist()], dtype=bool)

@@ -9,7 +9,7 @@ from dsa_des.answers.report import AnswerReport
 from dsa_des.answers.verdicts import ModelVerdict
 from dsa_des.block.mark import RED
 from dsa_des.costs.cost_report import Label, put_labels
-from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts, plain_log_ticks
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, plain_log_ticks
 from dsa_des.results.labels import unit_of
 
 _GREY, _ALLOWED = "#777777", "#e4efe4"
@@ -26,7 +26,7 @@ def draw_answers(path: Path, report: AnswerReport) -> None:
     """
     columns = min(_COLUMNS, len(report.results))
     rows = math.ceil(len(report.results) / columns)
-    with drawing(_WIDE_IN * columns, _HIGH_IN * rows + 0.5, path) as figure:
+    with draw_to_png(_WIDE_IN * columns, _HIGH_IN * rows + 0.5, path) as figure:
         figure.suptitle(f"{figure_text(report.title, 70)}:\nwhat each model changes, and costs")
         drawn = []
         for number, result in enumerate(report.results, start=1):

@@ -28,7 +28,7 @@ Batch = list[tuple[int, int, int]]
 _FEWEST, _MOST = 5, 16
 
 
-def turns_of(study: Study, many: int | None = None) -> list[Batch]:
+def split_into_turns(study: Study, many: int | None = None) -> list[Batch]:
     """Return the batches of a study: of its members where it runs over a sample, or of replicas.
 
     By default each is as large as the study's chunks.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from dsa_des.answers.alternatives import AS_IT_IS, COLUMN
-from dsa_des.answers.changes import PairedChange, confidence_of_each
+from dsa_des.answers.changes import PairedChange, confidence_per_interval
 from dsa_des.answers.models_in_turns import TurnTimes
 from dsa_des.answers.verdicts import (
     BEYOND,
@@ -16,11 +16,11 @@ from dsa_des.answers.verdicts import (
     WITHIN,
     Limit,
     ModelVerdict,
-    amount_text,
-    mark_front,
-    verdict_of,
+    format_change,
+    is_on_cost_front,
+    judge_model,
 )
-from dsa_des.results.labels import rounded_to, short, unit_of
+from dsa_des.results.labels import round_to_interval, short_text, unit_of
 from dsa_des.results.printing import round_estimate
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.terminal import terminal
@@ -65,14 +65,14 @@ class AnswerReport:
         self.verdicts: dict[str, list[ModelVerdict]] = {}
         for result in self.results:
             some = [
-                verdict_of(
+                judge_model(
                     name, result,
                     [c for c in self.changes if c.model == name and c.result.name == result.name],
                     self.limits[result.name], self.failed.get(name, ""),
                 )
                 for name in self.models
             ]  # fmt: skip
-            front = mark_front(some, cheap)
+            front = is_on_cost_front(some, cheap)
             self.verdicts[result.name] = [
                 replace(one, on_front=best) for one, best in zip(some, front, strict=True)
             ]
@@ -82,10 +82,14 @@ class AnswerReport:
     def cells(self, name: str) -> Iterator[list[str]]:
         """Give the cells of the table of a result, as `HEADS` names them."""
         own_ms, spread_ms = self.turn_times.per_run_ms(0)
-        yield [AS_IT_IS, f"{_plus_minus(own_ms, spread_ms)} ms a run", *[""] * (len(HEADS) - 2)]
+        yield [
+            AS_IT_IS,
+            f"{_format_plus_minus(own_ms, spread_ms)} ms a run",
+            *[""] * (len(HEADS) - 2),
+        ]
         for verdict in self.verdicts[name]:
             change = verdict.change
-            cost = _plus_minus(*self.costs[verdict.model])
+            cost = _format_plus_minus(*self.costs[verdict.model])
             said = f"{verdict.kind}{', front' if verdict.on_front else ''}"
             if change is None or verdict.kind == NOTHING:
                 yield [verdict.model, cost, "", "", "", "", f"{said}: {verdict.reason}"]
@@ -94,11 +98,13 @@ class AnswerReport:
             yield [
                 verdict.model, cost, value, interval,
                 "" if change.identical else self._location_text(change),
-                f"{change.differing:,} of {change.runs:,}", said + _remarks(change),
+                f"{change.differing:,} of {change.runs:,}", said + _change_notes(change),
             ]  # fmt: skip
 
     def _location_text(self, change: PairedChange) -> str:
-        return ", ".join(f"{n} = {short(v)}" for n, v in zip(self.axes, change.at, strict=True))
+        return ", ".join(
+            f"{n} = {short_text(v)}" for n, v in zip(self.axes, change.at, strict=True)
+        )
 
     def title_of(self, name: str) -> str:
         """Return the heading of a result's table."""
@@ -118,16 +124,20 @@ class AnswerReport:
                 {
                     "result": change.result.name, "model": change.model,
                     "where": self._location_text(change) or None,
-                    "as_it_is": _number(change.own.value), "as_it_is_low": _number(change.own.low),
-                    "as_it_is_high": _number(change.own.high),
-                    "change": _number(d.value), "low": _number(d.low), "high": _number(d.high),
-                    "limit": _number(self.limits[change.result.name].amount_at(change.own.value)),
+                    "as_it_is": _finite_or_none(change.own.value),
+                    "as_it_is_low": _finite_or_none(change.own.low),
+                    "as_it_is_high": _finite_or_none(change.own.high),
+                    "change": _finite_or_none(d.value), "low": _finite_or_none(d.low),
+                    "high": _finite_or_none(d.high),
+                    "limit": _finite_or_none(
+                        self.limits[change.result.name].amount_at(change.own.value)
+                    ),
                     "few": d.few, "pairs": d.count, "runs": change.runs,
                     "differing": change.differing, "lost": change.lost, "gained": change.gained,
                     "neither": change.neither, "cut_off": change.cut_off,
-                    "cpu_ms_per_run": _number(per_run), "cpu_of_own": _number(cost),
-                    "cpu_of_own_spread": _number(spread), "verdict": verdict.kind,
-                    "front": verdict.on_front, "wanted": _number(verdict.wanted),
+                    "cpu_ms_per_run": _finite_or_none(per_run), "cpu_of_own": _finite_or_none(cost),
+                    "cpu_of_own_spread": _finite_or_none(spread), "verdict": verdict.kind,
+                    "front": verdict.on_front, "wanted": _finite_or_none(verdict.wanted),
                     "reason": change.reason or None,
                 }
             )  # fmt: skip
@@ -184,13 +194,13 @@ class AnswerReport:
     def _limit_text(self, name: str) -> str:
         limit, unit = self.limits[name], unit_of(name)
         if not limit.is_share:
-            return f"{short(limit.amount)} {unit}".strip()
+            return f"{short_text(limit.amount)} {unit}".strip()
         text = f"{100 * limit.amount:g} %"
         amounts = {limit.amount_at(c.own.value) for c in self.changes if c.result.name == name}
         known = sorted(amount for amount in amounts if amount == amount)
         if not known:
             return text
-        ends = dict.fromkeys(_plain(amount) for amount in (known[0], known[-1]))
+        ends = dict.fromkeys(_format_three_digits(amount) for amount in (known[0], known[-1]))
         return f"{text} of it ({' to '.join(ends)}{f' {unit}' if unit else ''})"
 
     def _cost(self, model: str) -> float:
@@ -202,7 +212,7 @@ class AnswerReport:
 
     def _within_text(self, verdict: ModelVerdict) -> str:
         assert verdict.change is not None
-        return f"{amount_text(verdict.change)}, {self._cost_text(verdict)}"
+        return f"{format_change(verdict.change)}, {self._cost_text(verdict)}"
 
     def _explain_sameness(self, taken: Sequence[ModelVerdict]) -> str:
         """Return what it means that every run gave the same, for as many as there were."""
@@ -229,7 +239,8 @@ class AnswerReport:
         unit = unit_of(verdict.result.name)
         mine = [c.largest_possible_change for c in self.changes
                 if (c.model, c.result.name) == (verdict.model, verdict.result.name)]  # fmt: skip
-        return f"{self._cost(verdict.model):.2g}, at most {_plain(max(mine))} {unit}".rstrip()
+        most = _format_three_digits(max(mine))
+        return f"{self._cost(verdict.model):.2g}, at most {most} {unit}".rstrip()
 
     def _list_kind(
         self, some: Sequence[ModelVerdict], kind: str, words: str, text: Any
@@ -244,9 +255,11 @@ class AnswerReport:
     def _beyond_text(self, verdict: ModelVerdict) -> str:
         change = verdict.change
         assert change is not None
-        parts = [amount_text(change)] if change.difference.value == change.difference.value else []
+        parts = (
+            [format_change(change)] if change.difference.value == change.difference.value else []
+        )
         if change.presence is not None:
-            parts.append(_presence(change))
+            parts.append(_count_lost_values(change))
         where = self._location_text(change)
         return ", ".join(parts) + (f" where {where}" if where else "")
 
@@ -254,12 +267,12 @@ class AnswerReport:
         change, wanted = verdict.change, verdict.wanted
         assert change is not None
         parts = [
-            amount_text(change) + (" where " + self._location_text(change) if change.at else "")
+            format_change(change) + (" where " + self._location_text(change) if change.at else "")
         ]
         if change.identical:
             parts[0] = f"the same in all {change.runs:,} runs, which leaves {parts[0]}"
         if change.presence is not None:
-            parts.append(_presence(change))
+            parts.append(_count_lost_values(change))
         if change.difference.few:
             parts.append("too few events or values to rely on")
         if change.cut_off:
@@ -274,7 +287,7 @@ class AnswerReport:
 
     def notes_on_tables(self) -> list[str]:
         """Return what holds for all tables: how sure, how measured, and what was left out."""
-        each = 100 * confidence_of_each(self.confidence, self.comparisons)
+        each = 100 * confidence_per_interval(self.confidence, self.comparisons)
         turns = len({turn for turn, _ in self.turn_times.cpu_s})
         lines = [
             f"All intervals hold together, {100 * self.confidence:g} % sure: each of the "
@@ -295,7 +308,7 @@ class AnswerReport:
         return lines
 
 
-def _presence(change: PairedChange) -> str:
+def _count_lost_values(change: PairedChange) -> str:
     """Return how many runs lose their value, or come to have one: they are in no difference."""
     parts = [f"{many:,} of {change.runs:,} {words}" for many, words in (
         (change.lost, "have no value with it"), (change.gained, "have a value only with it"))
@@ -303,8 +316,8 @@ def _presence(change: PairedChange) -> str:
     return " and ".join(parts)
 
 
-def _remarks(change: PairedChange) -> str:
-    parts = [_presence(change)] if change.lost or change.gained else []
+def _change_notes(change: PairedChange) -> str:
+    parts = [_count_lost_values(change)] if change.lost or change.gained else []
     if change.neither and change.result.kind == NUMBER:
         parts.append(f"{change.neither:,} without a value with either")
     if change.cut_off:
@@ -312,18 +325,18 @@ def _remarks(change: PairedChange) -> str:
     return "".join(f"; {part}" for part in parts)
 
 
-def _plus_minus(value: float, spread: float) -> str:
+def _format_plus_minus(value: float, spread: float) -> str:
     if value != value:
         return ""
-    return " ± ".join(rounded_to(spread, value, spread)) if spread > 0.0 else f"{value:.2g}"
+    return " ± ".join(round_to_interval(spread, value, spread)) if spread > 0.0 else f"{value:.2g}"
 
 
-def _plain(value: float) -> str:
+def _format_three_digits(value: float) -> str:
     """Return three digits of a number, without a power of ten."""
     return f"{float(f'{value:.3g}'):,.10g}"
 
 
-def _number(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return None if math.isnan(value) or math.isinf(value) else value
 
 

@@ -98,7 +98,7 @@ class ModelVerdict:
         return self.kind in (SAME, WITHIN)
 
 
-def verdict_of(
+def judge_model(
     model: str, result: Result, changes: Sequence[PairedChange], limit: Limit, failed: str
 ) -> ModelVerdict:
     """Return the verdict on a model; `failed` says why some runs gave no result."""
@@ -107,10 +107,10 @@ def verdict_of(
             model, result, NOTHING, None, math.nan, math.nan, failed or "no run of both"
         )
     limits = [limit.amount_at(change.own.value) for change in changes]
-    judged = [_judge(change, most) for change, most in zip(changes, limits, strict=True)]
+    judged = [_judge_change(change, most) for change, most in zip(changes, limits, strict=True)]
     # The worst is told: what is surely beyond, then what is not known, then what weighs most.
     order = (BEYOND, NOTHING, OPEN, WITHIN, SAME)
-    sizes = [_size(change, most) for change, most in zip(changes, limits, strict=True)]
+    sizes = [_relative_size(change, most) for change, most in zip(changes, limits, strict=True)]
     k = min(range(len(judged)), key=lambda k: (order.index(judged[k]), -sizes[k]))
     kind, change, most = judged[k], changes[k], limits[k]
     weights = [
@@ -122,7 +122,7 @@ def verdict_of(
     return ModelVerdict(model, result, kind, change, most, weight, change.reason, wanted)
 
 
-def _judge(change: PairedChange, limit: float) -> str:
+def _judge_change(change: PairedChange, limit: float) -> str:
     interval = change.difference
     if change.reason:
         return NOTHING
@@ -150,7 +150,7 @@ def _relative_to_limit(amount: float, limit: float) -> float:
     return amount / limit if limit > 0.0 else math.inf
 
 
-def _size(change: PairedChange, limit: float) -> float:
+def _relative_size(change: PairedChange, limit: float) -> float:
     size = _relative_to_limit(abs(change.difference.value), limit)
     return size if size == size else math.inf
 
@@ -177,7 +177,7 @@ def _units_needed(change: PairedChange, limit: float) -> float:
     return math.ceil(wanted / digits) * digits
 
 
-def mark_front(verdicts: Sequence[ModelVerdict], costs: Mapping[str, float]) -> list[bool]:
+def is_on_cost_front(verdicts: Sequence[ModelVerdict], costs: Mapping[str, float]) -> list[bool]:
     """Return which models no other beats: as cheap, and surely changing as little.
 
     The scene as it is, of cost 1, changes nothing, and who is its equal is not better; costs that
@@ -194,7 +194,7 @@ def mark_front(verdicts: Sequence[ModelVerdict], costs: Mapping[str, float]) -> 
     ][1:]
 
 
-def amount_text(change: PairedChange) -> str:
+def format_change(change: PairedChange) -> str:
     """Return ``+1,240 ± 130 m``."""
     unit = unit_of(change.result.name)
     return f"{format_with_interval(change.difference.value, change.half_width)} {unit}".strip()

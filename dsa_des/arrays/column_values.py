@@ -60,7 +60,7 @@ Columns = dict[str, AnyArray | Text]
 Schema = dict[str, str]
 
 
-def in_seconds(values: Any) -> Any:
+def instants_to_seconds(values: Any) -> Any:
     """Convert instants to seconds since the start of their run; return other columns unchanged."""
     return values.ticks / values.ticks_per_s if isinstance(values, Instants) else values
 
@@ -86,7 +86,7 @@ def has_same_bits(some: AnyArray, others: AnyArray) -> bool:
     return not (some.strides[0] or others.strides[0]) or bool((some == others).all())
 
 
-def repeats(values: AnyArray, one: AnyArray) -> bool:
+def holds_only(values: AnyArray, one: AnyArray) -> bool:
     """Return whether all rows hold what `one` (1,) does, NaN and the sign of 0 too."""
     if values.dtype != one.dtype:
         return False
@@ -97,7 +97,7 @@ def repeats(values: AnyArray, one: AnyArray) -> bool:
     return not values.strides[0] or bool((values == value).all())
 
 
-def constant(value: Any, rows: int, kind: Any) -> AnyArray:
+def constant_column(value: Any, rows: int, kind: Any) -> AnyArray:
     """Return a column that holds the same in all rows: one value or array, seen `rows` times."""
     one = np.array(value, dtype=kind)
     one.flags.writeable = False
@@ -111,7 +111,7 @@ def is_constant(values: AnyArray) -> bool:
     return not values.strides[0]
 
 
-def one_row(values: AnyArray) -> AnyArray:
+def first_row_if_constant(values: AnyArray) -> AnyArray:
     """Return one row of what is known to hold the same in all rows; other values as they are."""
     return values if values.strides[0] else values[:1]
 
@@ -120,8 +120,8 @@ def constant_if_equal(values: AnyArray) -> AnyArray:
     """Return a column that holds the same in all of many rows as `constant`; others as they are."""
     if len(values) < _MANY:
         return values
-    same = repeats(values, values[:1])
-    return constant(values[0], len(values), values.dtype) if same else values
+    same = holds_only(values, values[:1])
+    return constant_column(values[0], len(values), values.dtype) if same else values
 
 
 def take_rows(values: AnyArray, rows: IntArray) -> AnyArray:
@@ -129,7 +129,7 @@ def take_rows(values: AnyArray, rows: IntArray) -> AnyArray:
     if len(values) and is_constant(values):
         if len(rows) <= len(values):  # a part of it is made in no time
             return values[: len(rows)]
-        return constant(values[0], len(rows), values.dtype)
+        return constant_column(values[0], len(rows), values.dtype)
     return values.take(rows)
 
 

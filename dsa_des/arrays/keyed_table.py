@@ -109,7 +109,7 @@ class KeyedTable:
         return self.from_columns(columns)
 
 
-def turns(keys: IntArray) -> list[IntArray]:
+def occurrences_by_turn(keys: IntArray) -> list[IntArray]:
     """Return the first row of every key, then the second ones, and so on."""
     if len(keys) == 0 or bool((keys == keys[0]).all()):
         return list(np.arange(len(keys))[:, np.newaxis])

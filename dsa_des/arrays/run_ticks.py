@@ -143,7 +143,7 @@ class RunTicks:
         """Return what puts them in order, those of one instant as they stand; None if they are."""
         if len(self) < 2:
             return None
-        (key,) = _keys(self)[0]
+        (key,) = _sortable_keys(self)[0]
         if bool((key[1:] >= key[:-1]).all()):
             return None
         return np.argsort(key, kind="stable")
@@ -181,7 +181,7 @@ def _is_same_run(parts: Sequence[RunTicks]) -> bool:
     return not filled or all(run[0] == filled[0][0] == run[-1] for run in filled)
 
 
-def _keys(*parts: RunTicks) -> tuple[list[IntArray], int]:
+def _sortable_keys(*parts: RunTicks) -> tuple[list[IntArray], int]:
     """Return numbers that lie as the instants do, and how many bits of them are the ticks'.
 
     Instants may be in no order. Where runs and ticks do not go into one number, ranks of the ticks
@@ -189,17 +189,17 @@ def _keys(*parts: RunTicks) -> tuple[list[IntArray], int]:
     """
     if all(is_single_run(part.run) for part in parts):
         return [part.tick for part in parts], -1
-    extents = [_extent(part) for part in parts]
+    extents = [_largest_tick_and_run(part) for part in parts]
     bits = max(_LEAST_BITS, max(most.bit_length() for most, _ in extents) + 1)
     if (max(runs for _, runs in extents) + 1) << bits < _MOST:
-        return [_key(part, bits) for part in parts], bits
+        return [_sortable_key(part, bits) for part in parts], bits
     ticks, rank = np.unique(np.concatenate([part.tick for part in parts]), return_inverse=True)
     ends = np.cumsum([len(part) for part in parts])[:-1]
     ranks: Any = np.split(rank.reshape(-1), ends)
     return [part.run * len(ticks) + rank for part, rank in zip(parts, ranks, strict=True)], -1
 
 
-def _extent(part: RunTicks) -> tuple[int, int]:
+def _largest_tick_and_run(part: RunTicks) -> tuple[int, int]:
     """Return the largest tick, either way, and the largest run."""
     if part._extent is None:
         tick, run = part.tick, part.run
@@ -208,7 +208,7 @@ def _extent(part: RunTicks) -> tuple[int, int]:
     return part._extent
 
 
-def _key(part: RunTicks, bits: int) -> IntArray:
+def _sortable_key(part: RunTicks, bits: int) -> IntArray:
     """Return run · 2**bits + tick, which ticks below 0 leave in order."""
     if part._keys is None or part._keys[0] != bits:
         key = part.run << bits
@@ -221,7 +221,7 @@ def _key(part: RunTicks, bits: int) -> IntArray:
 _unions: deque[tuple[set[RunTicks], RunTicks]] = deque(maxlen=2)
 
 
-def union(parts: Sequence[RunTicks]) -> RunTicks:
+def union_of_instants(parts: Sequence[RunTicks]) -> RunTicks:
     """Return every instant once, in order; each part is in order."""
     for put_together, known in _unions:
         if put_together == set(parts):  # the same objects
@@ -231,7 +231,7 @@ def union(parts: Sequence[RunTicks]) -> RunTicks:
         run = next((int(part.run[0]) for part in parts if len(part)), 0)
         instants = RunTicks.of_run(run, ticks)
     else:
-        keys, bits = _keys(*parts)
+        keys, bits = _sortable_keys(*parts)
         every, positions = sorted_union(keys)
         if bits < 0:
             rows = np.empty(len(every), dtype=np.int64)
@@ -248,7 +248,7 @@ def union(parts: Sequence[RunTicks]) -> RunTicks:
     return instants
 
 
-def _positions(instants: RunTicks, part: RunTicks) -> IntArray | None:
+def _known_positions(instants: RunTicks, part: RunTicks) -> IntArray | None:
     """Return where a part's instants are, if it is known to be one."""
     for one, positions in instants._parts:
         if one is part:
@@ -256,22 +256,26 @@ def _positions(instants: RunTicks, part: RunTicks) -> IntArray | None:
     return None
 
 
-def last_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
+def last_position_in_run(instants: RunTicks, asked: RunTicks) -> IntArray:
     """Return the last instant of its run at or before each asked (ticks in any order); -1: none."""
-    return _last_of_run(instants, asked)[0]
+    return _last_position_in_run(instants, asked)[0]
 
 
-def _last_of_run(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
-    """Return what `last_of_run` does, and whether each is known to be one of the instants."""
+def _last_position_in_run(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
+    """Return what `last_position_in_run` does, and whether each is known to be one of the
+    instants.
+    """
     there, count = len(instants.tick), len(asked.tick)
     if there == 0:
         return np.full(count, -1, dtype=np.int64), False
     if instants.tick is asked.tick and instants.run is asked.run:
         return np.arange(count), True
-    if (known := _positions(instants, asked)) is not None:
+    if (known := _known_positions(instants, asked)) is not None:
         return known, True
     one_run = _is_same_run((instants, asked))
-    known_keys, keys = (instants.tick, asked.tick) if one_run else _keys(instants, asked)[0]
+    known_keys, keys = (
+        (instants.tick, asked.tick) if one_run else _sortable_keys(instants, asked)[0]
+    )
     # As for blocks that run at the same instants; a search would take a tenth of a whole run.
     same = there == count >= _MANY and bool((known_keys == keys).all())
     if same and bool((keys[1:] > keys[:-1]).all()):
@@ -286,32 +290,32 @@ def _last_of_run(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
 
 def positions_among(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, BoolArray | None]:
     """Return the position of each asked instant, and whether it is there; None for all."""
-    positions, met = _last_of_run(instants, asked)
+    positions, met = _last_position_in_run(instants, asked)
     if met or len(instants) == 0:
         return positions, None if met else np.zeros(len(asked), dtype=bool)
     there: BoolArray = (positions >= 0) & (instants.tick[positions] == asked.tick)
     return positions, None if there.all() else there
 
 
-def ranks(*parts: RunTicks) -> tuple[list[IntArray], int]:
+def rank_instants(*parts: RunTicks) -> tuple[list[IntArray], int]:
     """Return the number of each instant among all there are, and how many these are."""
-    keys, _ = _keys(*parts)
+    keys, _ = _sortable_keys(*parts)
     every, rank = np.unique(np.concatenate(keys), return_inverse=True)
     ends = np.cumsum([len(key) for key in keys])[:-1]
     return np.split(rank.reshape(-1), ends), len(every)
 
 
-def next_of_run(instants: RunTicks, asked: RunTicks) -> IntArray:
+def next_position_in_run(instants: RunTicks, asked: RunTicks) -> IntArray:
     """Return the position of the first instant at or after each that is asked for, of its run.
 
     Where its run has none so late it is the position behind the run's last one.
     """
     if _is_same_run((instants, asked)):
         return instants.tick.searchsorted(asked.tick)
-    keys, _ = _keys(instants, asked)
+    keys, _ = _sortable_keys(instants, asked)
     return keys[0].searchsorted(keys[1])
 
 
-def first_of_run(instants: RunTicks, run: IntArray) -> IntArray:
+def first_position_in_run(instants: RunTicks, run: IntArray) -> IntArray:
     """Return the position of the first instant of some runs."""
     return instants.run.searchsorted(run)

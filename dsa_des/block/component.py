@@ -353,7 +353,7 @@ class RunEnd(Message):
     """
 
 
-def ends_its_run(block: type[Component]) -> bool:
+def may_end_its_run(block: type[Component]) -> bool:
     """Return whether blocks of a class may end their run."""
     return any(issubclass(output.message, RunEnd) for output in block.outputs.values())
 

@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block import source_file
-from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
+from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
 from dsa_des.block.source_file import (
+    append_to_module_path,
     file_of,
     find_other_module,
     folders_for_module,
-    last_on_path,
-    remember,
+    remember_module_folder,
     search_folders,
 )
 from dsa_des.errors import UsageError, did_you_mean
@@ -33,7 +33,7 @@ def refuse_hidden_module(module_name: str) -> None:
     """Raise UsageError if a module of ours, by name, would be imported from another package."""
     top = module_name.partition(".")[0]
     ours = _HOME / top
-    found = _place_of(top)
+    found = _location_of_module(top)
     if found is None or not (ours / "__init__.py").is_file():
         return
     folder = found.parent if found.name == "__init__.py" else found
@@ -45,7 +45,7 @@ def refuse_hidden_module(module_name: str) -> None:
     )
 
 
-def _place_of(top: str) -> Path | None:
+def _location_of_module(top: str) -> Path | None:
     """Return the file of a module, imported or not; the folder of one without ``__init__.py``."""
     try:
         loaded = sys.modules.get(top)
@@ -133,16 +133,16 @@ def load_named(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
         policy.announce_import(Foreign(key, name, short, file))
     module = _import_module(module_name, beside) if path is None else _import_file(path)
     try:
-        with foreign_code():
+        with wrap_foreign_errors():
             return getattr(module, class_name)
     except ForeignFailure as error:
         if not isinstance(error.__cause__, AttributeError):
             raise NotImportable(
-                f"{_location_of(module)} cannot give {class_name!r}: {error}"
+                f"{_folder_of_module(module)} cannot give {class_name!r}: {error}"
             ) from error
         known = [n for n in vars(module) if not n.startswith("_")]
         hint = did_you_mean(class_name, known)
-        raise NotImportable(f"{_location_of(module)} has no {class_name!r}{hint}") from None
+        raise NotImportable(f"{_folder_of_module(module)} has no {class_name!r}{hint}") from None
 
 
 def load_point(point: EntryPoint, key: str = "") -> Any:
@@ -158,7 +158,7 @@ def load_point(point: EntryPoint, key: str = "") -> Any:
         if policy.announce is not None or not policy.allowed:
             policy.announce_import(Foreign(key, point.name, point.module, file_of(point.module)))
     try:
-        with foreign_code(), _redirect_output(point.module):
+        with wrap_foreign_errors(), _redirect_output(point.module):
             return point.load()
     except ForeignFailure as error:
         what = f"cannot be imported from {point.value} ({file_of(point.module)}): {error}"
@@ -180,11 +180,11 @@ def load_installed(point: EntryPoint) -> Any:
 
 def is_ours(point: EntryPoint) -> bool:
     """Return whether this package itself registered an entry point."""
-    return point.dist is None or _name_of(point.dist) == _OURS
+    return point.dist is None or _distribution_name(point.dist) == _OURS
 
 
 @lru_cache(maxsize=64)
-def _name_of(distribution: Distribution) -> str:
+def _distribution_name(distribution: Distribution) -> str:
     """Return a package's name; studies ask for every block of every replica, and this parses."""
     return distribution.name.lower().replace("_", "-")
 
@@ -199,19 +199,19 @@ def _import_module(module_name: str, beside: Sequence[Path]) -> Any:
         )
     extra = folders_for_module(top, folders)
     try:
-        with last_on_path(extra), foreign_code(), _redirect_output(module_name):
+        with append_to_module_path(extra), wrap_foreign_errors(), _redirect_output(module_name):
             module = importlib.import_module(module_name)
     except ForeignFailure as error:
         raise NotImportable(_explain_failure(module_name, beside, error)) from error.__cause__
-    remember(top, extra)
+    remember_module_folder(top, extra)
     return module
 
 
 def _import_file(path: Path) -> Any:
-    if what := source_file.missing(path):
+    if what := source_file.missing_file_reason(path):
         raise NotImportable(what)
     try:
-        with foreign_code(), _redirect_output(path.name):
+        with wrap_foreign_errors(), _redirect_output(path.name):
             return source_file.import_file(path)
     except ForeignFailure as error:
         left = "it left with " if isinstance(error.__cause__, SystemExit) else ""
@@ -248,7 +248,7 @@ def _describe_shadowed(module_name: str) -> str:
     return f": {top} is the installed {found}, not the folder {here}; give that another name"
 
 
-def _location_of(module: Any) -> str:
+def _folder_of_module(module: Any) -> str:
     file = getattr(module, "__file__", None)
     if file == module.__name__:
         return str(file)

@@ -53,13 +53,13 @@ def describe_error(error: BaseException) -> str:
 _A_FOREIGN_PART = 3
 
 
-def error_at(error: BaseException, cls: type) -> str:
+def error_with_line(error: BaseException, cls: type) -> str:
     """Return what an exception says, and the line of a class's own package where it came from.
 
     One that ends a command with 3 says all itself: a program or an FMU has failed, not the class.
     """
     if getattr(error, "exit_code", 1) == _A_FOREIGN_PART:
-        return str(error) or error_text(error)
+        return str(error) or error_with_kind(error)
     package = cls.__module__.partition(".")[0]
     trace, place = error.__traceback__, None
     while trace is not None:
@@ -68,10 +68,10 @@ def error_at(error: BaseException, cls: type) -> str:
             code = frame.f_code
             place = f"{code.co_filename}, line {trace.tb_lineno}, in {code.co_name}"
         trace = trace.tb_next
-    return error_text(error) + ("" if place is None else f" ({place})")
+    return error_with_kind(error) + ("" if place is None else f" ({place})")
 
 
-def error_text(error: BaseException) -> str:
+def error_with_kind(error: BaseException) -> str:
     """Return what an exception says, with its kind: ``SystemExit: 0``."""
     try:
         text = str(error)
@@ -85,12 +85,12 @@ class ForeignFailure(Exception):
 
 
 @contextmanager
-def foreign_code(*expected: type[Exception]) -> Iterator[None]:
+def wrap_foreign_errors(*expected: type[Exception]) -> Iterator[None]:
     """Turn whatever is raised inside, ctrl-C by the user excepted, into `ForeignFailure`.
 
     The exception itself is its ``__cause__``. Those `expected` pass.
     """
-    with _interrupts() as interrupted:
+    with _watch_interrupts() as interrupted:
         try:
             yield
         except BaseException as error:
@@ -101,11 +101,11 @@ def foreign_code(*expected: type[Exception]) -> Iterator[None]:
                 raise
             if not isinstance(error, KeyboardInterrupt) and is_stop_request(error):
                 raise
-            raise ForeignFailure(error_text(error)) from error
+            raise ForeignFailure(error_with_kind(error)) from error
 
 
 @contextmanager
-def _interrupts() -> Iterator[Any]:
+def _watch_interrupts() -> Iterator[Any]:
     """Give a function that says whether ctrl-C was pressed meanwhile.
 
     A stranger may raise KeyboardInterrupt; only the signal tells it from the user's.

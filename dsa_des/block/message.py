@@ -59,7 +59,9 @@ _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] =
 _DERIVED: dict[type, DerivedColumns] = {}
 
 
-def _layout(message_type: type) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+def _fields_by_layout(
+    message_type: type,
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     if message_type not in _LAYOUTS:
         names: dict[str, list[str]] = {PER_ROW: [], PER_ENTRY: [], STATIC: []}
         for item in fields(message_type):
@@ -209,17 +211,18 @@ class Message(_Found):
         TypeError, ValueError
             With the class, the field, its length and that which it must have.
         """
-        rows, (row_names, entry_names, _) = len(self.tick), _layout(type(self))
+        rows, (row_names, entry_names, _) = len(self.tick), _fields_by_layout(type(self))
         self.run = self._runs()
         if len(self.run) != rows:
             raise ValueError(f"{_describe_field(self, 'run')} has {len(self.run)} of {rows} rows")
-        _check_each(self, row_names, rows, "rows")
+        _check_lengths(self, row_names, rows, "rows")
         offsets = getattr(self, "offsets", None)
         if offsets is None:
             return
         if not isinstance(offsets, np.ndarray) or offsets.dtype.kind not in "iu":
             raise TypeError(
-                f"{_describe_field(self, 'offsets')} is {_kind(offsets)}: whole numbers are needed"
+                f"{_describe_field(self, 'offsets')} is {_array_kind(offsets)}: whole numbers are "
+                f"needed"
             )
         if offsets.shape != (rows + 1,) or (
             rows > 1 and np.count_nonzero(offsets[1:] < offsets[:-1])
@@ -228,7 +231,7 @@ class Message(_Found):
                 f"{_describe_field(self, 'offsets')} of shape {offsets.shape} must be ascending, "
                 f"one more than the {rows} rows"
             )
-        _check_each(self, entry_names, int(offsets[-1]) - int(offsets[0]), "entries")
+        _check_lengths(self, entry_names, int(offsets[-1]) - int(offsets[0]), "entries")
 
     def take(self, rows: slice | IntArray) -> Self:
         """Return the message of the given rows (slices give views, index arrays give copies)."""
@@ -238,7 +241,7 @@ class Message(_Found):
                 return self.take(np.arange(start, stop, step))
             if start == 0 and stop == len(self):
                 return self
-        row_names, entry_names, _ = _layout(type(self))
+        row_names, entry_names, _ = _fields_by_layout(type(self))
         result = self._copy()
         values = result.__dict__
         for name in row_names:
@@ -254,7 +257,7 @@ class Message(_Found):
     def reorder(self, order: IntArray) -> Self:
         """Return the message with its entries in another order, each still of its row."""
         result = self._copy()
-        for name in _layout(type(self))[1]:
+        for name in _fields_by_layout(type(self))[1]:
             setattr(result, name, pick_rows(getattr(self, name), order))
         return result
 
@@ -280,7 +283,7 @@ class Message(_Found):
             names = [name for name, kind in zip(mine, kinds, strict=True) if kind is dict]
             if any(mine[name].keys() != others[name].keys() for name in names):
                 return False
-        return all(mine.get(name) is others.get(name) for name in _layout(type(self))[2])
+        return all(mine.get(name) is others.get(name) for name in _fields_by_layout(type(self))[2])
 
     def tables(self) -> dict[str, Columns]:
         """Return the rows to record: table → column → values, as declared in `recorded`.
@@ -298,7 +301,7 @@ class Message(_Found):
         offsets, index = entries_of(of.offsets, np.maximum(source, 0))  # type: ignore[attr-defined]
         there = np.repeat(source >= 0, np.diff(offsets))
         result = of.reorder(np.asarray(index)[there])
-        for name in (*_layout(type(self))[0], *_layout(type(self))[2]):
+        for name in (*_fields_by_layout(type(self))[0], *_fields_by_layout(type(self))[2]):
             setattr(result, name, getattr(self, name))
         result.run = self._runs()
         kept = np.where(source >= 0, np.diff(offsets), 0)
@@ -317,7 +320,7 @@ class Message(_Found):
         """Return one message with the rows of all parts, in the order given."""
         if len(parts) == 1:
             return parts[0]
-        row_names, entry_names, _ = _layout(type(parts[0]))
+        row_names, entry_names, _ = _fields_by_layout(type(parts[0]))
         # Static fields come from the last part: what a wire held before its first message may
         # know less than a real one.
         result = parts[-1]._copy()
@@ -356,32 +359,32 @@ def _describe_field(message: Message, name: str) -> str:
     return f"{type(message).__qualname__}.{name}"
 
 
-def _kind(value: Any) -> str:
+def _array_kind(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"an array of {value.dtype} of shape {value.shape}"
     return f"of type {type(value).__name__}"
 
 
-def _check_each(message: Message, names: tuple[str, ...], count: int, what: str) -> None:
+def _check_lengths(message: Message, names: tuple[str, ...], count: int, what: str) -> None:
     """Refuse arrays, or those of dicts, that have not one value for each row or entry."""
     fields_of = message.__dict__
     for name in names:
         value = fields_of.get(name)
         if value.__class__ is np.ndarray:
             if not value.ndim or len(value) != count or value.dtype.kind not in _NUMBERS:
-                _refuse(message, name, value, count, what)
+                _refuse_length(message, name, value, count, what)
         elif value.__class__ is dict:
             for key, item in value.items():
                 fits = item.__class__ is np.ndarray and item.ndim and len(item) == count
                 if not (fits or item is None or hasattr(item, "take_rows")):
-                    _refuse(message, f"{name}[{key!r}]", item, count, what)
+                    _refuse_length(message, f"{name}[{key!r}]", item, count, what)
         elif value is not None and not hasattr(value, "take_rows"):
-            _refuse(message, name, value, count, what)
+            _refuse_length(message, name, value, count, what)
 
 
-def _refuse(message: Message, name: str, value: Any, count: int, what: str) -> None:
+def _refuse_length(message: Message, name: str, value: Any, count: int, what: str) -> None:
     """Raise unless it is an array of another class that will do, such as a masked one."""
-    said = f"{_describe_field(message, name)} is {_kind(value)}"
+    said = f"{_describe_field(message, name)} is {_array_kind(value)}"
     if not isinstance(value, np.ndarray):
         raise TypeError(f"{said}: an array of {count} {what} is needed")
     if value.ndim == 0 or len(value) != count:

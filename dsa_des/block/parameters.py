@@ -48,7 +48,7 @@ LARGEST_BY_UNIT: Mapping[str, float] = {
 _UNITS = sorted(LARGEST_BY_UNIT, key=len, reverse=True)
 
 
-def largest_of(name: str) -> float:
+def largest_allowed(name: str) -> float:
     """Return the largest size allowed of a quantity, by the unit at the end of its name."""
     unit = next((unit for unit in _UNITS if name.endswith(f"_{unit}")), None)
     return LARGEST if unit is None else LARGEST_BY_UNIT[unit]
@@ -62,9 +62,10 @@ def refuse_extremes(name: str, value: Any) -> None:
     """
     if isinstance(value, float | int):
         size = abs(value)
-        if 0.0 < size < SMALLEST or size > largest_of(name):
+        if 0.0 < size < SMALLEST or size > largest_allowed(name):
             raise ValueError(
-                f"must be 0, or from {SMALLEST:g} to {largest_of(name):g} in size: that is what "
+                f"must be 0, or from {SMALLEST:g} to {largest_allowed(name):g} in size: that is "
+                f"what "
                 "can be computed with"
             )
     elif isinstance(value, list | tuple):

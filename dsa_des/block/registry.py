@@ -17,7 +17,7 @@ from dsa_des.block.foreign import (
     load_named,
     load_point,
 )
-from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
+from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
 from dsa_des.block.message import Message
 from dsa_des.errors import did_you_mean
 
@@ -104,7 +104,7 @@ class NotImported(UnknownType):
     """
 
 
-def find(type_name: str, key: str = "", beside: Sequence[Path] = ()) -> type[Component]:
+def find_component(type_name: str, key: str = "", beside: Sequence[Path] = ()) -> type[Component]:
     """Return the class of a registered block type, ``module:Class`` or ``./file.py:Class``.
 
     The `key` names it, for messages; modules may lie in the folders `beside`. Raises NotImported if
@@ -126,20 +126,20 @@ def find(type_name: str, key: str = "", beside: Sequence[Path] = ()) -> type[Com
     except NotImportable as error:
         raise UnknownType(str(error)) from error.__cause__
     if point is not None and is_ours(point):
-        return _component(found)
+        return _require_component(found)
     return _check_component_class(type_name, found)
 
 
 def _check_component_class(type_name: str, found: Any) -> type[Component]:
     """Return a stranger's class if it is a component."""
     try:
-        with foreign_code(UnknownType):
-            return _component(found)
+        with wrap_foreign_errors(UnknownType):
+            return _require_component(found)
     except ForeignFailure as error:
         raise UnknownType(f"{type_name} cannot be looked at: {error}") from error.__cause__
 
 
-def _component(found: Any) -> type[Component]:
+def _require_component(found: Any) -> type[Component]:
     """Return a class if it declares what the engine reads of every block."""
     if not (isinstance(found, type) and issubclass(found, Component)):
         raise UnknownType("is not a dsa_des.Component")

@@ -11,14 +11,14 @@ from pathlib import Path, PurePosixPath
 
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.foreign import load_installed
-from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
+from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
 from dsa_des.errors import UsageError
 
 #: The entry points of functions that return a folder of scenes and studies.
 GROUP = "dsa_des.examples"
 
 
-def folders() -> list[Path]:
+def example_folders() -> list[Path]:
     """Return the folders of examples of all installed packages.
 
     UsageError if one of them cannot be asked.
@@ -26,7 +26,7 @@ def folders() -> list[Path]:
     found = []
     for point in entry_points_of(GROUP).values():
         try:
-            with foreign_code(UsageError):
+            with wrap_foreign_errors(UsageError):
                 found.append(Path(load_installed(point)()))
         except ForeignFailure as error:
             message = f"{GROUP}: {point.name} gives no folder: {error}"
@@ -43,20 +43,20 @@ def resolve_shipped(path: Path, name: str) -> Path:
     wanted = PurePosixPath(name)
     if os.path.lexists(path) or wanted.is_absolute() or not wanted.suffix or ".." in wanted.parts:
         return path
-    there = [folder / wanted for folder in folders() if (folder / wanted).is_file()]
+    there = [folder / wanted for folder in example_folders() if (folder / wanted).is_file()]
     if not there and len(wanted.parts) == 1:
-        there = [found for folder in folders() for found in folder.rglob(glob.escape(name))]
+        there = [found for folder in example_folders() for found in folder.rglob(glob.escape(name))]
     return there[0] if len(there) == 1 else path
 
 
 def shipped_files() -> Iterator[tuple[PurePosixPath, Path]]:
     """Yield every TOML file of the folders with its place there, without ``.toml``."""
-    for folder in folders():
+    for folder in example_folders():
         for path in sorted(folder.rglob("*.toml")):
             yield PurePosixPath(path.relative_to(folder).with_suffix("").as_posix()), path
 
 
-def files_named(name: str) -> list[Path]:
+def find_shipped_files(name: str) -> list[Path]:
     """Return the shipped files that a name may mean: the one of that path, or all of that stem.
 
     Names are ``first_light`` or ``systems/oasys``, with ``.toml`` or without.

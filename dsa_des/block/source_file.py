@@ -14,7 +14,7 @@ from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
 
-from dsa_des.errors import nearest
+from dsa_des.errors import nearest_name
 
 _UNFINDABLE = (ImportError, AttributeError, TypeError, ValueError, OSError)
 # Top module → the folder it was found in: what is beside it may be imported with it again.
@@ -27,7 +27,7 @@ def search_folders(beside: Iterable[Path] = ()) -> list[str]:
 
 
 @contextlib.contextmanager
-def last_on_path(folders: Sequence[str]) -> Iterator[None]:
+def append_to_module_path(folders: Sequence[str]) -> Iterator[None]:
     """Put folders last on the module path, meanwhile, those that are not on it."""
     added = [folder for folder in folders if folder not in sys.path]
     if added:
@@ -56,7 +56,7 @@ def is_installed(top: str) -> bool:
         return False
 
 
-def remember(top: str, folders: Sequence[str]) -> None:
+def remember_module_folder(top: str, folders: Sequence[str]) -> None:
     """Note in which of the folders a module was found."""
     for folder in folders:
         if PathFinder.find_spec(top, [folder]) is not None:
@@ -84,7 +84,7 @@ def file_of(module_name: str, beside: Iterable[Path] = ()) -> str:
     Where there is none: ``there is no such module``, or the kind of module it is.
     """
     try:
-        spec = _spec(module_name, search_folders(beside))
+        spec = _find_module_spec(module_name, search_folders(beside))
     except _UNFINDABLE:
         spec = None
     if spec is None:
@@ -96,9 +96,9 @@ def file_of(module_name: str, beside: Iterable[Path] = ()) -> str:
     return spec.origin or "no file"
 
 
-def _spec(module_name: str, folders: Sequence[str]) -> ModuleSpec | None:
+def _find_module_spec(module_name: str, folders: Sequence[str]) -> ModuleSpec | None:
     top, *rest = module_name.split(".")
-    with last_on_path(folders_for_module(top, folders)):
+    with append_to_module_path(folders_for_module(top, folders)):
         # Finds the module of a name without dots; nothing is imported.
         spec = importlib.util.find_spec(top) if top else None
     name = top
@@ -127,7 +127,7 @@ def is_file(name: str) -> bool:
     return name.endswith(_SUFFIX) and ("/" in name or os.sep in name)
 
 
-def absolute(name: str) -> str:
+def absolute_type_name(name: str) -> str:
     """Return ``./file.py:Class`` with its file written out; other names as they are.
 
     A `SourcedText` knows the folder of the file that it was written in.
@@ -142,14 +142,14 @@ def path_of(name: str) -> Path:
     return Path(os.path.abspath(Path(getattr(name, "folder", "")) / file))
 
 
-def missing(path: Path) -> str:
+def missing_file_reason(path: Path) -> str:
     """Return what is wrong with a file that cannot be imported from; nothing if it is there."""
     try:
         if path.is_file():
             return ""
         if path.exists():
             return f"{path} is no regular file"
-        close = nearest(path.name, [entry.name for entry in path.parent.glob(f"*{_SUFFIX}")])
+        close = nearest_name(path.name, [entry.name for entry in path.parent.glob(f"*{_SUFFIX}")])
     except (OSError, ValueError) as error:
         return f"{str(path)!r} cannot be read: {error}"
     return f"there is no file {path}" + (f"; did you mean {close}?" if close else "")
@@ -168,7 +168,7 @@ def import_file(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
-        with last_on_path([str(path.parent)]):
+        with append_to_module_path([str(path.parent)]):
             spec.loader.exec_module(module)
     except BaseException:
         del sys.modules[name]

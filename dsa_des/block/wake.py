@@ -196,10 +196,10 @@ def checked_messages(
         if len(message.tick) == 0:
             continue
         message.check()
-        yield port, _with_runs(port, message, ran)
+        yield port, _set_runs(port, message, ran)
 
 
-def _with_runs(port: str, message: Message, ran: RunTicks) -> Message:
+def _set_runs(port: str, message: Message, ran: RunTicks) -> Message:
     """Return a message that says of which runs its rows are, if its block does not say it.
 
     Rows that are not of instants at which the block ran, in order, are refused: what a row is dated

@@ -12,12 +12,12 @@ from rich.text import Text
 from dsa_des.block.component import Component
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.ladder import Ladder
-from dsa_des.block.registry import UnknownType, find
-from dsa_des.block.shipped_files import folders
+from dsa_des.block.registry import UnknownType, find_component
+from dsa_des.block.shipped_files import example_folders
 from dsa_des.commands.parameters import Row, parameter_rows, scene_tables
-from dsa_des.errors import OutputError, UsageError, did_you_mean, nearest
+from dsa_des.errors import OutputError, UsageError, did_you_mean, nearest_name
 from dsa_des.files.output_file import temporary_folder
-from dsa_des.files.output_names import check_place, location_of, reason_of, user_path
+from dsa_des.files.output_names import absolute_location, check_folder_path, reason_of, user_path
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.examples import Example, examples
 from dsa_des.terminal import terminal
@@ -32,7 +32,7 @@ def show_components(name: str | None, key: str | None = None) -> None:
     console = terminal.console(120)
     kinds = {one.partition(".")[0] for one in entry_points_of()}
     if name is None:
-        _list(console, list(entry_points_of()))
+        _print_type_list(console, list(entry_points_of()))
         console.print()
         console.print("dsa-des components TYPE describes one; module:Class works as a type too.")
         console.print(
@@ -40,7 +40,9 @@ def show_components(name: str | None, key: str | None = None) -> None:
         )
         return
     if name in kinds and name not in entry_points_of() and key is None:
-        _list(console, [one for one in entry_points_of() if one.partition(".")[0] == name])
+        _print_type_list(
+            console, [one for one in entry_points_of() if one.partition(".")[0] == name]
+        )
         return
     table = scene_tables().get(name)
     if table is not None:
@@ -48,10 +50,10 @@ def show_components(name: str | None, key: str | None = None) -> None:
         _describe_table(console, name, what, lambda: _rows_of_key(name, key, rows()))
         return
     try:
-        cls = find(name)
+        cls = find_component(name)
     except UnknownType as error:
         known = [*entry_points_of(), *kinds, *scene_tables()]
-        close = nearest(name, known)
+        close = nearest_name(name, known)
         hint = f"; did you mean {close!r}?" if close else f"; kinds: {', '.join(sorted(kinds))}"
         message = f"{name}: there is no such block type, kind of blocks or table of scenes{hint}"
         raise UsageError(message if ":" not in name else f"{name}: {error}") from error
@@ -59,7 +61,7 @@ def show_components(name: str | None, key: str | None = None) -> None:
         keys = parameter_rows(cls.Parameters) + parameter_rows(BlockOptions)
         _print_rows(console, _PARAMETER_HEADS, _rows_of_key(name, key, keys))
         return
-    _describe(console, name, cls)
+    _print_type(console, name, cls)
 
 
 def _rows_of_key(name: str, key: str | None, rows: list[Row]) -> list[Row]:
@@ -73,17 +75,17 @@ def _rows_of_key(name: str, key: str | None, rows: list[Row]) -> list[Row]:
     return matches
 
 
-def _list(console: Any, names: typing.Sequence[str]) -> None:
+def _print_type_list(console: Any, names: typing.Sequence[str]) -> None:
     table = Table(box=None, pad_edge=False)
     for heading in ("type", "takes", "sends", "what it is"):
         table.add_column(heading, no_wrap=heading == "type")
     for name in names:
         try:
-            cls = find(name)
+            cls = find_component(name)
         except UnknownType as error:  # a broken plug-in must not hide the others
             table.add_row(name, "", "", f"cannot be loaded: {error}")
             continue
-        table.add_row(name, _ports(cls.inputs), _ports(cls.outputs), _summary(cls))
+        table.add_row(name, _ports_text(cls.inputs), _ports_text(cls.outputs), _first_sentence(cls))
     console.print(table)
 
 
@@ -109,15 +111,15 @@ def _print_rows(
     console.print(table, highlight=False)
 
 
-def _ports(ports: typing.Mapping[str, Any]) -> str:
+def _ports_text(ports: typing.Mapping[str, Any]) -> str:
     return ", ".join(sorted(ports)) or "-"
 
 
-def _summary(cls: type[Component]) -> str:
+def _first_sentence(cls: type[Component]) -> str:
     return (cls.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
 
 
-def _describe(console: Any, name: str, cls: type[Component]) -> None:
+def _print_type(console: Any, name: str, cls: type[Component]) -> None:
     console.print(Text.assemble((printable(name), "bold"), f"  {printable(cls.path())}"))
     console.print(Text(inspect.cleandoc(cls.__doc__ or "")))
     console.print()
@@ -183,7 +185,7 @@ _CODE = "__pycache__"
 def show_examples(copy: str | None) -> None:
     """List all shipped scenes, studies and cases, or copy their folders with what they extend."""
     if copy is not None:
-        _copy(user_path(copy, _OPTION))
+        _copy_example_folders(user_path(copy, _OPTION))
         return
     shipped = examples()
     if not shipped:
@@ -194,23 +196,23 @@ def show_examples(copy: str | None) -> None:
         if of_kind:
             say(heading)
         for example in of_kind:
-            say(_line(example, width))
+            say(_example_line(example, width))
 
 
-def _line(example: Example, width: int) -> str:
+def _example_line(example: Example, width: int) -> str:
     return f"  {example.name:<{width}}  {' '.join(example.title.split())}"
 
 
-def _copy(target: Path) -> None:
+def _copy_example_folders(target: Path) -> None:
     """Copy the folders of all packages; several each into a folder of the package's name."""
-    sources = folders()
+    sources = example_folders()
     if not sources:
         raise UsageError("no installed package ships scenes or studies")
-    check_place(target, _OPTION)
+    check_folder_path(target, _OPTION)
     try:
         if os.path.lexists(target) and any(target.iterdir()):
             raise UsageError(f"{_OPTION} {target}: is not empty; a new folder is needed")
-        path = location_of(target)
+        path = absolute_location(target)
         with temporary_folder(path) as folder:
             copied = folder / "copy"
             copied.mkdir()

@@ -11,25 +11,25 @@ from typing import Any
 import numpy as np
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.source_file import absolute
+from dsa_des.block.source_file import absolute_type_name
 from dsa_des.commands.study import (
     check_workers,
-    finish,
     options_as_sets,
     report_crashes,
+    report_finished_study,
     result_names,
     run_into,
     show_study,
 )
-from dsa_des.commands.what_changed import ConditionPair, say_changes_along, say_what_changed
+from dsa_des.commands.what_changed import ConditionPair, print_changes, print_changes_along_axis
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import new_folder
 from dsa_des.results.curves import draw_scatter
-from dsa_des.results.differences import changes_of, difference, paired_units
+from dsa_des.results.differences import estimate_difference, paired_units, subtract_without_rounding
 from dsa_des.results.figures import safe_name
 from dsa_des.results.folder import STUDY_JSON, StudyFolder
-from dsa_des.results.labels import short
+from dsa_des.results.labels import short_text
 from dsa_des.results.printing import round_estimate
 from dsa_des.results.record import StudyRecord
 from dsa_des.results.tables import Tables
@@ -114,7 +114,7 @@ def compare_command(
         report_crashes(tables, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
-        show_study(Path(paths[0]), results, _first(results))
+        show_study(Path(paths[0]), results, _print_changes_first(results))
         return
     if len(paths) < 2:
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
@@ -130,11 +130,11 @@ def compare_command(
     with new_folder(out, _HOME, "compare") as home:
         for file, study in zip(files, studies, strict=True):
             if file.resolve() not in by_path:
-                by_path[file.resolve()] = _tables(file, study, workers, home)
+                by_path[file.resolve()] = _tables_of_path(file, study, workers, home)
         tables = [by_path[file.resolve()] for file in files]
         for number, (other, path) in enumerate(zip(tables[1:], paths[1:], strict=True), start=2):
             stem = "scatter" if len(tables) == 2 else f"scatter-{number}"
-            _compare(tables[0], other, (paths[0], path), results, home / stem)
+            _print_comparison(tables[0], other, (paths[0], path), results, home / stem)
     report_crashes(list(by_path.values()), _ANEW)
 
 
@@ -154,7 +154,7 @@ def _compare_swap(
         block, equals, name = swap.partition("=")
         if not equals or not name:
             raise UsageError(f"--swap {swap!r}: must have the form BLOCK=TYPE")
-        name = absolute(name)
+        name = absolute_type_name(name)
         if block not in scene.blocks:
             hint = did_you_mean(block, scene.blocks)
             raise UsageError(f"--swap {swap}: the scene has no block {block!r}{hint}")
@@ -167,7 +167,7 @@ def _compare_swap(
     result_names(results_of(study), results)
     with new_folder(out, _HOME, "compare") as home:
         folder = run_into(study, home, workers, resume=False, again=_ANEW)
-    tables = finish(study, folder, only=results, first=_first(results))
+    tables = report_finished_study(study, folder, only=results, first=_print_changes_first(results))
     block, (own, _) = chosen[0]
     for value, _, base, rows in tables.rows.comparisons_with_baseline(f"swap.{block}", own):
         for metric in tables.notable_results(results):
@@ -177,8 +177,8 @@ def _compare_swap(
     return [tables]
 
 
-def _first(results: Sequence[str]) -> Callable[[Tables], None]:
-    return lambda tables: say_changes_along(tables, results)
+def _print_changes_first(results: Sequence[str]) -> Callable[[Tables], None]:
+    return lambda tables: print_changes_along_axis(tables, results)
 
 
 def _is_study(path: Path) -> bool:
@@ -204,7 +204,9 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _tables(path: Path, study: Study | StudyRecord, workers: int | None, home: Path) -> Tables:
+def _tables_of_path(
+    path: Path, study: Study | StudyRecord, workers: int | None, home: Path
+) -> Tables:
     """Return the tables of a study's folder, or run the study or scene first."""
     if not isinstance(study, Study):
         return Tables(study, StudyFolder(path))
@@ -222,7 +224,7 @@ def _list_farthest_runs(metric: str, pair: ConditionPair, names: tuple[str, str]
     """List the runs in which a result differs most, with a command that opens each."""
     first, second = pair.values(metric)
     known = np.flatnonzero(~np.isnan(first - second))
-    changes = changes_of(first[known], second[known])
+    changes = subtract_without_rounding(first[known], second[known])
     changed = [
         (-abs(change), pair.keys[run], run)
         for change, run in zip(changes.tolist(), known.tolist(), strict=True)
@@ -234,13 +236,13 @@ def _list_farthest_runs(metric: str, pair: ConditionPair, names: tuple[str, str]
     say(f"{metric}: where {names[1]} differs most from {names[0]}")
     for _, key, run in sorted(changed)[:_MOST_SHOWN]:
         where = ", ".join(map(str, key[:-1])) + (", " if len(key) > 1 else "")
-        change = f"{short(float(first[run]))} -> {short(float(second[run]))}"
+        change = f"{short_text(float(first[run]))} -> {short_text(float(second[run]))}"
         say(f"  {where}replica {key[-1]}: {change}")
         for tables, rows in zip(pair.tables, pair.rows, strict=True):
             say(f"    {tables.record.command(tables.rows.row(rows[run]))}")
 
 
-def _compare(
+def _print_comparison(
     one: Tables, other: Tables, names: tuple[str, str], only: Sequence[str], stem: Path
 ) -> None:
     """Print paired differences of two studies over the places and units that both have."""
@@ -267,21 +269,23 @@ def _compare(
         if at not in theirs:
             continue
         runs = ConditionPair(one, rows, other, theirs[at])
-        where = ", ".join(f"{n} = {short(v)}" for n, v in zip(one.rows.axes, at, strict=True))
+        where = ", ".join(f"{n} = {short_text(v)}" for n, v in zip(one.rows.axes, at, strict=True))
         places.append((where, runs))
         names_of = [key[:-1] if one.rows.over else key for key in runs.keys]
         codes = {name: code for code, name in enumerate(dict.fromkeys(names_of))}
         units = np.array([codes[name] for name in names_of], dtype=np.int64)
         for metric in metrics:
             pair = paired_units(units, *runs.values(metric))[1:]
-            d = difference(*pair, one.record.confidence, one.record.interval, kind=kinds[metric])
+            d = estimate_difference(
+                *pair, one.record.confidence, one.record.interval, kind=kinds[metric]
+            )
             lines.append(
-                [*map(short, at), metric, *round_estimate(d.paired), str(d.paired.count),
+                [*map(short_text, at), metric, *round_estimate(d.paired), str(d.paired.count),
                  round_estimate(d.unpaired)[1].rstrip(" *")]
             )  # fmt: skip
             together.setdefault(metric, []).append(pair)
     shown = [r for r in one.results if r.name in known and (not only or r.name in only)]
-    say_what_changed(names, places, shown)
+    print_changes(names, places, shown)
     for who, there, others in ((names[0], one, known), (names[1], other, own)):
         alone = [r.name for r in there.results if r.name not in others]
         if alone:

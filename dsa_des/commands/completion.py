@@ -8,7 +8,7 @@ from click.shell_completion import CompletionItem
 
 from dsa_des.block.component import Component
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.registry import UnknownType, find
+from dsa_des.block.registry import UnknownType, find_component
 from dsa_des.commands.parameters import parameter_rows, scene_tables
 from dsa_des.errors import SceneError
 from dsa_des.scene.block_table import BlockOptions
@@ -41,7 +41,7 @@ def cases(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
 def types(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Return block types, their kinds and the tables of scenes."""
     names = entry_points_of()
-    return _items(
+    return _completion_items(
         {*names, *(name.partition(".")[0] for name in names), *scene_tables()}, incomplete
     )
 
@@ -49,40 +49,48 @@ def types(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
 def keys_of_type(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Return the keys of the block type that was named before."""
     try:
-        return _items(_keys(find(str(ctx.params.get("name")))), incomplete)
+        return _completion_items(
+            _parameter_keys(find_component(str(ctx.params.get("name")))), incomplete
+        )
     except UnknownType:
         return []
 
 
 def keys(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Return the keys that the scene named before has, as far as ``blocks.NAME.`` is typed."""
-    scene = _scene(ctx)
+    scene = _read_typed_scene(ctx)
     if scene is None:
         return []
     names = {"seed", "duration_s"}
     for name, block in scene.blocks.items():
-        names |= {f"blocks.{name}.{key}" for key in _keys(block.cls)}
+        names |= {f"blocks.{name}.{key}" for key in _parameter_keys(block.cls)}
     return [CompletionItem(f"{key}=") for key in sorted(names) if key.startswith(incomplete)]
 
 
 def swaps(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
     """Return the blocks of the scene named before, or the types of one's kind."""
-    scene = _scene(ctx)
+    scene = _read_typed_scene(ctx)
     name, equals, begin = incomplete.partition("=")
     if not equals:
-        return _items((f"{block}=" for block in scene.blocks), name) if scene is not None else []
+        return (
+            _completion_items((f"{block}=" for block in scene.blocks), name)
+            if scene is not None
+            else []
+        )
     kind = "" if scene is None else scene.blocks[name].type_name if name in scene.blocks else ""
     of_kind = [one for one in entry_points_of() if one.partition(".")[0] == kind.partition(".")[0]]
-    return _items((f"{name}={one}" for one in of_kind or entry_points_of()), f"{name}={begin}")
+    return _completion_items(
+        (f"{name}={one}" for one in of_kind or entry_points_of()), f"{name}={begin}"
+    )
 
 
-def _keys(cls: type[Component]) -> list[str]:
+def _parameter_keys(cls: type[Component]) -> list[str]:
     return [
         row[0].strip() for model in (cls.Parameters, BlockOptions) for row in parameter_rows(model)
     ]
 
 
-def _scene(ctx: click.Context) -> Scene | None:
+def _read_typed_scene(ctx: click.Context) -> Scene | None:
     """Return the scene that the words before name, if it can be read."""
     name: Any = ctx.params.get("scene") or next(iter(ctx.params.get("paths") or ()), None)
     if name is None and ctx.args:
@@ -94,9 +102,9 @@ def _scene(ctx: click.Context) -> Scene | None:
 
 
 def _complete_shipped(kind: str, incomplete: str) -> list[CompletionItem]:
-    items = _items((one.name for one in shipped() if one.kind == kind), incomplete)
+    items = _completion_items((one.name for one in shipped() if one.kind == kind), incomplete)
     return items or [CompletionItem(incomplete, type="file")]
 
 
-def _items(names: Iterable[str], incomplete: str) -> list[CompletionItem]:
+def _completion_items(names: Iterable[str], incomplete: str) -> list[CompletionItem]:
     return [CompletionItem(name) for name in sorted(names) if name.startswith(incomplete)]

@@ -9,15 +9,15 @@ from typing import Any
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.foreign import NotImportable, load_named
 from dsa_des.block.ladder import Ladder, Unavailable
-from dsa_des.block.registry import UnknownType, find
-from dsa_des.costs.climb import Comparison, RungCost, applies, climb, parse_budgets
-from dsa_des.costs.cost_report import draw_costs, print_ladder, print_rest, write_table
+from dsa_des.block.registry import UnknownType, find_component
+from dsa_des.costs.climb import Comparison, RungCost, climb, inapplicable_reason, parse_budgets
+from dsa_des.costs.cost_report import draw_costs, print_chain_and_notes, print_ladder, write_table
 from dsa_des.costs.replay import RungRun, run_watched
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.record.run_folder import write_run_json
-from dsa_des.running.reports import load_reports, notes_of_loading, say_notes
+from dsa_des.running.reports import load_reports, notes_of_loading, print_notes
 from dsa_des.scene.examples import find_input_file
 from dsa_des.terminal.terminal import say, say_json
 
@@ -67,7 +67,7 @@ def cost_of_accuracy(
         find_input_file(scene, "scene"), sets=sets, swaps=swaps, seed=seed, duration_s=duration
     )
     variants.scene.dropped = variants.dropped
-    say_notes(notes_of_loading(variants.scene))
+    print_notes(notes_of_loading(variants.scene))
     climbs, notes = ladders_to_climb(variants, block, against)
     limits = parse_budgets(budgets, [ladder for _, ladder in climbs])
     target = OutputFolder.from_option(out, Path("runs"), f"{variants.scene.path.stem}-cost")
@@ -116,7 +116,7 @@ def cost_of_accuracy(
     if as_json:
         say_json(rows + chain)
     else:
-        print_rest(chain, notes, compare)
+        print_chain_and_notes(chain, notes, compare)
         names = sorted(path.name for path in target.path.iterdir())
         say()
         say(f"{target.path}: {', '.join(names)}")
@@ -188,7 +188,7 @@ def ladders_to_climb(
         ]
     climbs, notes = [], []
     for name, ladder in declared:
-        why = applies(variants, name, ladder)
+        why = inapplicable_reason(variants, name, ladder)
         if why:
             notes.append(f"{name}, {ladder.name}: not climbed, {why}")
         else:
@@ -222,7 +222,7 @@ def _map_functions() -> dict[str, str]:
     functions: dict[str, str] = {}
     for type_name in entry_points_of():
         try:
-            ladders = find(type_name).ladders
+            ladders = find_component(type_name).ladders
         except UnknownType:  # a broken plug-in
             continue
         for ladder in ladders:

@@ -6,20 +6,25 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dsa_des.answers.alternatives import Alternatives, comparable, find_alternatives, with_models
+from dsa_des.answers.alternatives import (
+    Alternatives,
+    add_model_axis,
+    find_alternatives,
+    make_comparable_study,
+)
 from dsa_des.answers.changes import changes_by_model
 from dsa_des.answers.figure import draw_answers
-from dsa_des.answers.models_in_turns import Batch, TurnTimes, run_in_turns, turns_of
+from dsa_des.answers.models_in_turns import Batch, TurnTimes, run_in_turns, split_into_turns
 from dsa_des.answers.report import AnswerReport, print_report
 from dsa_des.answers.verdicts import BEYOND, NOTHING, OPEN, Limit, parse_limits
 from dsa_des.commands.cost import CostProgress
 from dsa_des.commands.study import (
     check_workers,
     options_as_sets,
+    output_folder_of,
     require_empty_or_resumed,
     result_names,
     stop_with,
-    target_of,
 )
 from dsa_des.costs.cost_report import write_table
 from dsa_des.errors import UsageError
@@ -85,7 +90,7 @@ def cost_at_the_answer(
     words += _as_options("repeats", [str(repeats)] if repeats else [])
     described.repeat = command_of(["cost", *words], sets, described.path)
     answer = AnswerOfStudy(described, answers, block, listed, budgets, repeats)
-    target = target_of(Path("runs"), f"{path.stem}-cost", out, resume)
+    target = output_folder_of(Path("runs"), f"{path.stem}-cost", out, resume)
     require_empty_or_resumed(target, resume, "what was begun there")
     folder = target if isinstance(target, Path) else target()
     words += [*_as_options("workers", [str(workers)] if workers else []), "--out", str(folder)]
@@ -101,7 +106,7 @@ def cost_at_the_answer(
     content: dict[str, Any] = {"rows": rows, "sentences": said, "notes": report.notes_on_tables()}
     try:
         write_table(folder / "answer.parquet", rows)
-        write_file(folder / "answer.csv", _csv(rows))
+        write_file(folder / "answer.csv", _rows_to_csv(rows))
         if not no_figures:
             draw_answers(folder / "answer.png", report)
         write_run_json(folder, {"title": described.title, "cost": content})
@@ -140,7 +145,7 @@ class AnswerOfStudy:
             for name in dict.fromkeys(answers)
         ]
         self._limits: dict[str, Limit] = parse_limits(budgets, self._results)
-        plain, self._notes = comparable(study)
+        plain, self._notes = make_comparable_study(study)
         axes = [axis.column for axis in plain.axes if axis.column not in plain.over]
         places = 1
         for axis in plain.axes:
@@ -157,9 +162,9 @@ class AnswerOfStudy:
                 *whys,
                 *(f"  {note}" for note in found.notes),
             )
-        self.study = with_models(plain, found.these)
+        self.study = add_model_axis(plain, found.these)
         self._repeats = repeats
-        self._batches: list[Batch] = turns_of(self.study, repeats)
+        self._batches: list[Batch] = split_into_turns(self.study, repeats)
         self.turn_times = TurnTimes()
         self._failed: dict[str, str] = {}
         self._folder: StudyFolder | None = None
@@ -232,7 +237,7 @@ class AnswerOfStudy:
         done, turns = kept
         if self._repeats not in (None, turns):
             raise UsageError(f"--repeats {self._repeats}: {path.parent} was begun in {turns} turns")
-        self._batches = turns_of(self.study, turns)
+        self._batches = split_into_turns(self.study, turns)
         return done
 
     def has_changes(self) -> bool:
@@ -305,7 +310,7 @@ def _count_text(report: AnswerReport) -> str:
     return ", ".join(parts)
 
 
-def _csv(rows: Sequence[dict[str, Any]]) -> bytes:
+def _rows_to_csv(rows: Sequence[dict[str, Any]]) -> bytes:
     names = list(dict.fromkeys(name for row in rows for name in row))
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, names, lineterminator="\n")

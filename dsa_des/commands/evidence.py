@@ -5,10 +5,10 @@ from pathlib import Path
 
 from dsa_des.commands.study import (
     check_workers,
+    output_folder_of,
     report_crashes,
     require_empty_or_resumed,
     run_into,
-    target_of,
 )
 from dsa_des.errors import UsageError
 from dsa_des.evidence.case import ASSESSED, read_case
@@ -43,7 +43,7 @@ def evidence_command(
         raise UsageError(f"--encounters is {encounters}: it must be 2 or more")
     path = find_input_file(case, "case")
     checked = read_case(path, sets, encounters)
-    location = target_of(_HOME, path.stem, out, resume)
+    location = output_folder_of(_HOME, path.stem, out, resume)
     require_empty_or_resumed(location, resume, "a pack")
     try:
         inputs = files_of_case(checked).copies()
@@ -57,7 +57,7 @@ def evidence_command(
     repeat = command_of(["evidence", *many], sets, path)
     try:
         for name, content in inputs.items():
-            _write(target / INPUTS / name, content)
+            _write_evidence_file(target / INPUTS / name, content)
     except OSError as error:
         why = describe_write_error(error, target)
         raise UsageError(f"--out {target}: cannot be written: {why}") from error
@@ -73,8 +73,8 @@ def evidence_command(
     evidence = pack.evidence()
     settled = draw_convergence(pack.findings, tables[ASSESSED].record.confidence)
     changed = draw_sensitivity(pack.changes) if pack.changes else None
-    _write(target / MACHINE, pack.machine_readable())
-    _write(target / PAGE, evidence_page(evidence, settled, changed))
+    _write_evidence_file(target / MACHINE, pack.machine_readable())
+    _write_evidence_file(target / PAGE, evidence_page(evidence, settled, changed))
     say(pack.line, err=pack.passes is None)
     say(f"wrote {target / PAGE}")
     report_crashes(list(tables.values()), again)
@@ -82,6 +82,6 @@ def evidence_command(
         sys.exit(1)
 
 
-def _write(path: Path, content: bytes) -> None:
+def _write_evidence_file(path: Path, content: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     write_file(path, content)

@@ -10,9 +10,9 @@ from dsa_des.commands.scene import SceneOptions, load
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import PICTURES, check_ending, check_file
 from dsa_des.files.output_names import user_path
-from dsa_des.record.drawing import drawing, figure_text
-from dsa_des.running.grain import grain_of
-from dsa_des.scene.graph import depths
+from dsa_des.record.drawing import draw_to_png, figure_text
+from dsa_des.running.grain import choose_grain
+from dsa_des.scene.graph import block_depths
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.terminal.terminal import console, say, say_lines
@@ -36,7 +36,7 @@ def show_graph(dot: bool, png: bool, out: str | None, **options: Unpack[SceneOpt
         _print_table(loaded)
 
 
-def _wires(scene: Scene) -> list[Wire]:
+def _sorted_wires(scene: Scene) -> list[Wire]:
     return sorted(scene.wires, key=lambda w: (w.source, w.output, w.target, w.input))
 
 
@@ -49,8 +49,8 @@ def _delay_label(wire: Wire) -> str:
 def _print_table(scene: Scene) -> None:
     from rich.table import Table
 
-    depth = depths(scene.graph)
-    windowed = grain_of(scene, None).windowed
+    depth = block_depths(scene.graph)
+    windowed = choose_grain(scene, None).windowed
     table = Table(title=f"{shorten(scene.title)}: blocks in the order they run within an instant")
     for heading in ("depth", "block", "type", "runs", "fed by"):
         table.add_column(heading)
@@ -63,7 +63,7 @@ def _print_table(scene: Scene) -> None:
         grain = "look-ahead" if name in windowed else "scan by scan"
         fed = [
             f"{shorten(w.source)}.{w.output}" + (f" ({_delay_label(w)})" if w.is_delayed else "")
-            for w in _wires(scene)
+            for w in _sorted_wires(scene)
             if w.target == name
         ]
         who = shorten(name), shorten(block.type_name)
@@ -73,31 +73,31 @@ def _print_table(scene: Scene) -> None:
 
 def to_dot(scene: Scene) -> str:
     """Return the graph in Graphviz's DOT language, always in the same order."""
-    lines = [f'digraph "{_escape(scene.title)}" {{', "  rankdir=LR;", "  node [shape=box];"]
+    lines = [f'digraph "{_escape_dot(scene.title)}" {{', "  rankdir=LR;", "  node [shape=box];"]
     for name, block in scene.blocks.items():
-        shown = f"{_escape(name)}\\n{_escape(block.type_name)}"
-        lines.append(f'  "{_escape(name)}" [label="{shown}"];')
-    for wire in _wires(scene):
+        shown = f"{_escape_dot(name)}\\n{_escape_dot(block.type_name)}"
+        lines.append(f'  "{_escape_dot(name)}" [label="{shown}"];')
+    for wire in _sorted_wires(scene):
         message = scene.blocks[wire.source].cls.outputs[wire.output].message.__name__
         sent = message + (f"\\n{_delay_label(wire)}" if wire.is_delayed else "")
         style = ", style=dashed" if wire.is_delayed else ""
-        ends = f'"{_escape(wire.source)}" -> "{_escape(wire.target)}"'
+        ends = f'"{_escape_dot(wire.source)}" -> "{_escape_dot(wire.target)}"'
         lines.append(f'  {ends} [label="{sent}"{style}];')
     return "\n".join([*lines, "}"])
 
 
-def _escape(text: str) -> str:
+def _escape_dot(text: str) -> str:
     return printable(text).replace("\\", "\\\\").replace('"', '\\"')
 
 
 def draw_graph(scene: Scene, path: Path) -> None:
     """Draw the graph from left to right by depth."""
-    depth = depths(scene.graph)
-    position = _layout(scene.graph, depth)
+    depth = block_depths(scene.graph)
+    position = _block_positions(scene.graph, depth)
     columns = max(depth.values()) + 1
     rows = max(list(depth.values()).count(d) for d in set(depth.values()))
     try:
-        with drawing(1.2 + 2.1 * columns, 1.2 + 1.1 * rows, path) as figure:
+        with draw_to_png(1.2 + 2.1 * columns, 1.2 + 1.1 * rows, path) as figure:
             axes = figure.add_axes((0, 0, 1, 0.9))
             axes.set_axis_off()
             axes.set_xlim(-0.6, columns - 0.4)
@@ -116,11 +116,11 @@ def _draw_blocks(axes: Any, scene: Scene, position: Mapping[str, tuple[float, fl
             x, y, f"{figure_text(name, 24)}\n{kind}", ha="center", va="center", fontsize=8,
             bbox={"boxstyle": "round,pad=0.5", "facecolor": "#eef3f8", "edgecolor": "#33557a"},
         )  # fmt: skip
-    for wire in _wires(scene):
+    for wire in _sorted_wires(scene):
         _draw_wire(axes, wire, position, boxes)
 
 
-def _layout(graph: nx.DiGraph, depth: Mapping[str, int]) -> dict[str, tuple[float, float]]:
+def _block_positions(graph: nx.DiGraph, depth: Mapping[str, int]) -> dict[str, tuple[float, float]]:
     position = {}
     for level in sorted(set(depth.values())):
         names = sorted(name for name in graph if depth[name] == level)

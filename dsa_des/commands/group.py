@@ -16,7 +16,7 @@ from typing import Any
 import click
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign_calls import error_text, module_of_error
+from dsa_des.block.foreign_calls import error_with_kind, module_of_error
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say, say_lines
@@ -46,7 +46,7 @@ def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
             module = module_of_error(error.__traceback__)
             if module.partition(".")[0] in _OURS:
                 raise
-            say(f"error: the module {module!r} left with {error_text(error)}", err=True)
+            say(f"error: the module {module!r} left with {error_with_kind(error)}", err=True)
             sys.exit(2)
         except BrokenPipeError:  # the reader of our output went away
             sys.stderr.close()
@@ -107,7 +107,7 @@ def scene_options(required: bool = True) -> Callable[[Callable[..., None]], Call
             swap_option,
             set_option,
             click.argument(
-                "scene", metavar="SCENE", required=required, shell_complete=completing("scenes")
+                "scene", metavar="SCENE", required=required, shell_complete=word_completer("scenes")
             ),
         ):
             command = option(command)
@@ -116,7 +116,7 @@ def scene_options(required: bool = True) -> Callable[[Callable[..., None]], Call
     return add
 
 
-def completing(what: str) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
+def word_completer(what: str) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
     """Return what completes a word in a shell; `what` is a function of `completion`."""
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
@@ -147,7 +147,7 @@ set_option = click.option(
     multiple=True,
     metavar="KEY=VALUE",
     help="Change one value, e.g. blocks.radar.scan_rate_hz=2.",
-    shell_complete=completing("keys"),
+    shell_complete=word_completer("keys"),
 )
 swap_option = click.option(
     "--swap",
@@ -155,7 +155,7 @@ swap_option = click.option(
     multiple=True,
     metavar="BLOCK=TYPE",
     help="Put another component into a block; name and wires stay.",
-    shell_complete=completing("swaps"),
+    shell_complete=word_completer("swaps"),
 )
 
 

@@ -36,13 +36,13 @@ def parameter_rows(
         kind = "table" if nested else _type_name(info.annotation)
         if nested and typing.get_origin(info.annotation) is list:
             kind = "list of tables"
-        default = _default(info)
+        default = _default_text(info)
         if nested and default not in ("required", "-", "[]", "{}"):
             default = "see below"
-        bounds = _bounds(info)
+        bounds = _bounds_text(info)
         # A field whose name ends like a unit says that it has none.
         said = info.json_schema_extra if isinstance(info.json_schema_extra, dict) else {}
-        unit = str(said.get("unit", _unit(name, kind)))
+        unit = str(said.get("unit", _unit_from_name(name, kind)))
         meaning = info.description or ""
         meaning += " May change while a run lasts." if name in changing else ""
         kind += f" {bounds}" if bounds else ""
@@ -74,7 +74,7 @@ def _type_name(annotation: Any) -> str:
     return names.get(annotation, getattr(annotation, "__name__", str(annotation)).lower())
 
 
-def _bounds(info: FieldInfo) -> str:
+def _bounds_text(info: FieldInfo) -> str:
     signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
     bounds = [
         f"{sign} {getattr(item, attribute):g}"
@@ -85,7 +85,7 @@ def _bounds(info: FieldInfo) -> str:
     return ", ".join(bounds)
 
 
-def _default(info: FieldInfo) -> str:
+def _default_text(info: FieldInfo) -> str:
     # What tells tables of a list apart has to be given.
     tag = typing.get_origin(info.annotation) is typing.Literal
     if tag and len(typing.get_args(info.annotation)) == 1:
@@ -102,7 +102,7 @@ def _default(info: FieldInfo) -> str:
     return str(value)
 
 
-def _unit(name: str, kind: str) -> str:
+def _unit_from_name(name: str, kind: str) -> str:
     if kind == "whole number" and name.endswith("_m"):
         return ""  # a count: the m of m out of n
     if kind == "true or false":

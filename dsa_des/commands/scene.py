@@ -18,8 +18,8 @@ from dsa_des.running.reports import (
     load_reports,
     notes_of_loading,
     notes_of_scene,
-    say_if_long,
-    say_notes,
+    print_notes,
+    warn_of_long_run,
 )
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.data_files import scene_of_data
@@ -60,7 +60,7 @@ def load(
         loaded = load_tables(file, sets, swaps, seed, duration)
         loaded.about = data.about
     if not noted:
-        say_notes(notes_of_loading(loaded))
+        print_notes(notes_of_loading(loaded))
     return loaded
 
 
@@ -156,8 +156,8 @@ def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
             return
         simulation = Simulation(loaded)
         check_grouping(loaded, partial(load, **options, noted=True))
-    say_if_long(simulation)
-    say_notes(notes_of_scene(simulation))
+    warn_of_long_run(simulation)
+    print_notes(notes_of_scene(simulation))
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
     say(
         f"{scene}: ok. {len(loaded.blocks)} blocks, {len(loaded.wires)} wires, "

@@ -9,10 +9,10 @@ from typing import Any, NoReturn
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.files.output_file import check_file, write_file
-from dsa_des.files.output_names import check_place, claim_folder, user_path
+from dsa_des.files.output_names import check_folder_path, claim_folder, user_path
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import STUDY_JSON, StudyFolder, latest_folder
-from dsa_des.results.printing import show
+from dsa_des.results.printing import print_study_tables
 from dsa_des.results.record import Result, StudyRecord
 from dsa_des.results.rows import StoredRows
 from dsa_des.results.tables import DIFFERENCES, RATIOS, REQUIREMENTS, SUMMARY, Tables
@@ -71,14 +71,14 @@ def study_command(
     def resume_command(folder: Path) -> str:
         return _resume_command(name, folder, sets, workers, executor, scheduler, measure)
 
-    target = target_of(_HOME, described.path.stem, out, resume)
+    target = output_folder_of(_HOME, described.path.stem, out, resume)
     folder = run_into(described, target, workers, resume, resume_command, executor, scheduler)
     try:
-        tables = finish(
+        tables = report_finished_study(
             described, folder, quiet=quiet or as_json, draw=not no_figures, as_json=as_json
         )
         if measure:
-            _measure(folder, silent=quiet)
+            _measure_model_errors(folder, silent=quiet)
     except KeyboardInterrupt:
         stop_with("interrupted", resume_command(folder.path), 130)
     report_crashes([tables], resume_command(folder.path))
@@ -109,12 +109,14 @@ def require_empty_or_resumed(
 ) -> None:
     """Raise UsageError where a folder is not empty and the command does not resume."""
     if isinstance(location, Path):
-        check_place(location)
+        check_folder_path(location)
         if location.is_dir() and any(location.iterdir()) and not resume:
             raise UsageError(f"--out {location}: is not empty; --resume continues {what}")
 
 
-def target_of(home: Path, stem: str, out: str | None, resume: bool) -> "Path | Callable[[], Path]":
+def output_folder_of(
+    home: Path, stem: str, out: str | None, resume: bool
+) -> "Path | Callable[[], Path]":
     """Return the folder that --out names, or the latest to go on with, or what makes a new one."""
     if out is not None:
         return user_path(out)
@@ -161,7 +163,7 @@ def report_crashes(result: Sequence[Tables], again: str) -> None:
     """Say how many runs crashed, and end with exit code 1 if there are any."""
     crashed = sum(tables.rows.crashed for tables in result)
     if crashed:
-        runs = sum(_count(tables) for tables in result)
+        runs = sum(_count_crashed_runs(tables) for tables in result)
         say(
             f"{crashed} of {runs} runs crashed: the process that ran them died each time; "
             "try them again with",
@@ -199,8 +201,8 @@ def run_into(
     try:
         folder = StudyFolder(path if isinstance(path, Path) else path())
         folder.open(description_text(study), resume=resume)
-        with _progress(study) as report:
-            _refuse_nothing(study, folder, run_study(study, folder, executor, report))
+        with _show_progress(study) as report:
+            _refuse_all_failed(study, folder, run_study(study, folder, executor, report))
     except Stopped as stop:
         assert folder is not None
         code = 130 if str(stop) == "interrupted" else 1
@@ -217,7 +219,7 @@ def run_into(
     return folder
 
 
-def _refuse_nothing(study: Study, folder: StudyFolder, progress: Progress) -> None:
+def _refuse_all_failed(study: Study, folder: StudyFolder, progress: Progress) -> None:
     """Raise UsageError where every run of a study failed: it answers nothing."""
     if 0 < progress.failed == progress.runs and not progress.crashed:
         why = shorten(str(StoredRows(folder).failed[0]["error"]), _LONGEST_ERROR)
@@ -227,7 +229,7 @@ def _refuse_nothing(study: Study, folder: StudyFolder, progress: Progress) -> No
         )
 
 
-def finish(
+def report_finished_study(
     study: "Study | StudyRecord", folder: StudyFolder, *, quiet: bool = False,
     only: Sequence[str] = (), first: "Callable[[Tables], None]" = lambda tables: None,
     draw: bool = True, as_json: bool = False,
@@ -251,13 +253,13 @@ def finish(
         say_json(_tables_as_json(tables, figures))
     elif not quiet:
         first(tables)
-        show(terminal.console(160), tables, only)
+        print_study_tables(terminal.console(160), tables, only)
         for path in figures:
             say(f"wrote {path}")
         if isinstance(study, Study) and (reason := study_lock_step_refusal(study)):
             say(f"replicas ran one by one where they cannot run in lock step: {reason}")
         say()
-        say(f'pandas.read_parquet("{folder.parts}") opens all {_count(tables)} runs')
+        say(f'pandas.read_parquet("{folder.parts}") opens all {_count_crashed_runs(tables)} runs')
     return tables
 
 
@@ -270,7 +272,7 @@ def _tables_as_json(tables: Tables, figures: Sequence[Path]) -> dict[str, Any]:
     }
     return {
         "folder": str(tables.folder.path),
-        "runs": _count(tables),
+        "runs": _count_crashed_runs(tables),
         "failed": tables.rows.failed,
         "crashed": tables.rows.crashed,
         "undone": tables.folder.failure_counts(),
@@ -279,7 +281,7 @@ def _tables_as_json(tables: Tables, figures: Sequence[Path]) -> dict[str, Any]:
     }
 
 
-def _count(tables: Tables) -> int:
+def _count_crashed_runs(tables: Tables) -> int:
     return len(tables.rows.places) + tables.rows.failed
 
 
@@ -293,10 +295,12 @@ def show_study(
     """
     folder = StudyFolder(path)
     every = result_names(folder.record.results, only)
-    finish(folder.record, folder, only=only or every, first=first, draw=draw, as_json=as_json)
+    report_finished_study(
+        folder.record, folder, only=only or every, first=first, draw=draw, as_json=as_json
+    )
 
 
-def _measure(folder: StudyFolder, silent: bool = False) -> None:
+def _measure_model_errors(folder: StudyFolder, silent: bool = False) -> None:
     """Measure the errors of the models of a study's first run, and keep them in its folder."""
     from dsa_des.commands.cost import CostProgress
     from dsa_des.costs.models import measure_errors
@@ -319,7 +323,7 @@ def report_command(folder: str, out: str | None, no_figures: bool, measure: bool
     if out is not None:
         check_file(target)
     if measure:
-        _measure(study)
+        _measure_model_errors(study)
     try:
         if not no_figures:
             draw_figures(Tables(study.record, study))
@@ -341,7 +345,7 @@ def result_names(
 
 
 @contextmanager
-def _progress(study: Study) -> Iterator[Any]:
+def _show_progress(study: Study) -> Iterator[Any]:
     """Show a progress bar on a terminal, and a line now and then elsewhere."""
     clock = Clock()
     if sys.stderr.isatty():

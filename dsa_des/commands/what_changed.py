@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.results.differences import changes_of
-from dsa_des.results.labels import short, unit_of
+from dsa_des.results.differences import subtract_without_rounding
+from dsa_des.results.labels import short_text, unit_of
 from dsa_des.results.record import EVENT, Result
 from dsa_des.results.tables import Tables
 from dsa_des.terminal.terminal import console, say
@@ -83,10 +83,12 @@ class _Change:
         if self.mean != self.mean:
             return ""
         unit = unit_of(self.result.name)
-        return f"{'+' if self.mean > 0 else ''}{short(float(f'{self.mean:.3g}'))} {unit}".strip()
+        return (
+            f"{'+' if self.mean > 0 else ''}{short_text(float(f'{self.mean:.3g}'))} {unit}".strip()
+        )
 
 
-def say_what_changed(
+def print_changes(
     names: tuple[str, str], places: Sequence[tuple[str, ConditionPair]], results: Iterable[Result]
 ) -> None:
     """Say what changed from one condition to another.
@@ -98,12 +100,12 @@ def say_what_changed(
     width: int = console(160).width
     say(f"What changed from {shorten(names[0])} to {shorten(names[1])}:")
     for where, pair in places[:_MOST_PLACES]:
-        changes = [_change(result, pair) for result in results]
+        changes = [_count_change(result, pair) for result in results]
         indent = "  "
         if where:
             say(f"  {where}")
             indent = "    "
-        for line in _lines(changes):
+        for line in _change_lines(changes):
             for part in textwrap.wrap(
                 printable(line), width, initial_indent=indent, subsequent_indent=f"{indent}  ",
                 break_long_words=False, break_on_hyphens=False,
@@ -114,7 +116,7 @@ def say_what_changed(
     say()
 
 
-def _lines(changes: Sequence[_Change]) -> list[str]:
+def _change_lines(changes: Sequence[_Change]) -> list[str]:
     if not any(change.pairs for change in changes):
         return ["nothing can be said: no run is in both"]
     clauses: dict[str, list[str]] = {}
@@ -128,7 +130,7 @@ def _lines(changes: Sequence[_Change]) -> list[str]:
     others = [change for change in changes if change.result.told is None]
     changed = [change for change in others if change.has_change]
     if changed:
-        shown = [_brief(change) for change in changed[:_MOST_NAMED]]
+        shown = [_brief_change(change) for change in changed[:_MOST_NAMED]]
         more = len(changed) - _MOST_NAMED
         lines.append(
             ("also changed: " if clauses else "changed: ")
@@ -140,17 +142,17 @@ def _lines(changes: Sequence[_Change]) -> list[str]:
     return lines
 
 
-def _brief(change: _Change) -> str:
+def _brief_change(change: _Change) -> str:
     name = shorten(change.result.name)
     if change.amount:
         return f"{name} ({change.amount} on average)"
     return f"{name} (only one of the two has it in {change.gone + change.come})"
 
 
-def _change(result: Result, pair: ConditionPair) -> _Change:
+def _count_change(result: Result, pair: ConditionPair) -> _Change:
     before, after = pair.values(result.name)
     known = ~np.isnan(before) & ~np.isnan(after)
-    changes = changes_of(before[known], after[known])
+    changes = subtract_without_rounding(before[known], after[known])
     mean = float(changes.mean()) if known.any() else float("nan")
     fell, rose = changes < 0.0, changes > 0.0
     gone, come = ~np.isnan(before) & np.isnan(after), np.isnan(before) & ~np.isnan(after)
@@ -158,7 +160,7 @@ def _change(result: Result, pair: ConditionPair) -> _Change:
     return _Change(result, len(pair.keys), counts[0], counts[1], counts[2], counts[3], mean)
 
 
-def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
+def print_changes_along_axis(tables: Tables, only: Sequence[str] = ()) -> None:
     """Say what changes along the axis that a study compares, from its baseline to each value."""
     if tables.baseline is None:
         return
@@ -166,11 +168,14 @@ def say_changes_along(tables: Tables, only: Sequence[str] = ()) -> None:
     names_of = [shorten(name) for name in tables.rows.axes if name != axis]
     by_value: dict[Any, list[tuple[str, ConditionPair]]] = {}
     for value, others, base, rows in tables.rows.comparisons_with_baseline(axis, baseline):
-        where = [f"{n} = {short(other)}" for n, other in zip(names_of, others, strict=True)]
+        where = [f"{n} = {short_text(other)}" for n, other in zip(names_of, others, strict=True)]
         pair = ConditionPair(tables, base, tables, rows)
         by_value.setdefault(value, []).append((", ".join(where), pair))
     results = [result for result in tables.results if not only or result.name in only]
     swap = axis.startswith("swap.")
     for value, places in by_value.items():
-        names = [short(item) if swap else f"{axis} = {short(item)}" for item in (baseline, value)]
-        say_what_changed((names[0], names[1]), places, results)
+        names = [
+            short_text(item) if swap else f"{axis} = {short_text(item)}"
+            for item in (baseline, value)
+        ]
+        print_changes((names[0], names[1]), places, results)

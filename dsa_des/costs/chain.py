@@ -16,7 +16,7 @@ from dsa_des.block.mark import RED
 from dsa_des.costs.climb import Comparison, RungCost, is_on_front
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.drawing import drawing, figure_text, plain_log_ticks
+from dsa_des.record.drawing import draw_to_png, figure_text, plain_log_ticks
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -43,40 +43,40 @@ def run_chain(
         [c for c in group if not c.unavailable and (c.pareto or c.in_scene)] for group in groups
     ]
     chosen = [group for group in chosen if group]
-    whole = _count(chosen)
-    while _count(chosen) > MOST:
+    whole = _count_combinations(chosen)
+    while _count_combinations(chosen) > MOST:
         widest = max(chosen, key=len)
         widest.remove(_choose_expendable(widest))
     combinations = list(itertools.product(*chosen))
     best = [next(c for c in group if c.rung == c.reference) for group in groups]
-    reference_scene = variants.with_rungs(_choices(best))
+    reference_scene = variants.with_rungs(_choices_of_rungs(best))
     reference = _run_recorded(reference_scene)
     rows: list[dict[str, Any]] = []
     scenes: list[Scene] = []
     for combination in combinations:
         try:
-            scene = variants.with_rungs(_choices(combination))
+            scene = variants.with_rungs(_choices_of_rungs(combination))
             effect = comparison(reference, _run_recorded(scene))
         except (Unavailable, SceneError, BlockFailure):
             continue
         scenes.append(scene)
-        rows.append(_row(combination, comparison, effect))
+        rows.append(_chain_row(combination, comparison, effect))
     times = _time_runs(scenes)
     for row, cpu_s, scene in zip(rows, times, scenes, strict=True):
-        row["cpu_us_per_target_scan"] = 1e6 * cpu_s / max(_target_scans(scene), 1)
+        row["cpu_us_per_target_scan"] = 1e6 * cpu_s / max(_count_target_scans(scene), 1)
     points = [(row["cpu_us_per_target_scan"], row["error_p95"]) for row in rows]
     for row, front in zip(rows, is_on_front(points), strict=True):
         row["pareto"] = front
     picked = (
         f"whole chain: {len(rows)} combinations of the rungs on their own ladder's front and the "
-        f"scene's own, of {_count(groups)} in all"
+        f"scene's own, of {_count_combinations(groups)} in all"
     )
     if whole > MOST:
         picked += f"; of {whole} such combinations, ladders were thinned to at most {MOST}"
     return rows, picked
 
 
-def _count(groups: Sequence[Sequence[RungCost]]) -> int:
+def _count_combinations(groups: Sequence[Sequence[RungCost]]) -> int:
     count = 1
     for group in groups:
         count *= len(group)
@@ -98,7 +98,7 @@ def _choose_expendable(group: Group) -> RungCost:
     return min(inner, key=gap)
 
 
-def _choices(combination: Sequence[RungCost]) -> list[Choice]:
+def _choices_of_rungs(combination: Sequence[RungCost]) -> list[Choice]:
     return [Choice(c.block, c.ladder, c.ladder.rung(c.rung)) for c in combination]
 
 
@@ -119,7 +119,7 @@ def _time_runs(scenes: Sequence[Scene]) -> list[float]:
     return best
 
 
-def _target_scans(scene: Scene) -> int:
+def _count_target_scans(scene: Scene) -> int:
     """Return scans of all clocks times targets."""
     simulation = Simulation(scene)
     width = max(component.width for component in simulation.components.values())
@@ -130,7 +130,7 @@ def _target_scans(scene: Scene) -> int:
     return scans * width
 
 
-def _row(
+def _chain_row(
     combination: Sequence[RungCost], comparison: Comparison, effect: dict[str, Any]
 ) -> dict[str, Any]:
     return {
@@ -153,7 +153,7 @@ def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]], label: st
     )
     key_in = 0.2 + 0.13 * len(best)
     height_in = 4.6 + key_in
-    with drawing(7.5, height_in, path) as figure:
+    with draw_to_png(7.5, height_in, path) as figure:
         axes = figure.add_subplot()
         errors = [row["error_p95"] for row in rows]
         # A log axis has no zero: runs that are alike stand on a floor of their own.

@@ -14,9 +14,9 @@ from dsa_des.costs.replay import (
     errors_against,
     errors_against_precise,
     median_and_spread,
+    replay_values,
     run_rung,
     time_interleaved,
-    values_of,
 )
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError, UsageError, did_you_mean
@@ -167,15 +167,15 @@ class RungCost:
             "reference": self.reference,
             "in_scene": self.in_scene,
             "unavailable": self.unavailable or None,
-            "cpu_us_per_target_scan": _number(self.cpu_us_per_target_scan),
-            "cpu_spread_us": _number(self.cpu_spread_us),
+            "cpu_us_per_target_scan": _finite_or_none(self.cpu_us_per_target_scan),
+            "cpu_spread_us": _finite_or_none(self.cpu_spread_us),
             "tied_with": self.tied_with,
             "repeats": self.repeats,
             "error_quantity": first.name,
             "error_unit": first.unit,
-            "error_mean": _number(self.error.mean),
-            "error_p95": _number(self.error.p95),
-            "error_max": _number(self.error.maximum),
+            "error_mean": _finite_or_none(self.error.mean),
+            "error_p95": _finite_or_none(self.error.p95),
+            "error_max": _finite_or_none(self.error.maximum),
             "error_is": "own" if self.rung == self.reference else "added",
             "error_note": self.error_note or None,
             "pareto": self.pareto,
@@ -185,9 +185,9 @@ class RungCost:
             "errors": {
                 quantity.name: {
                     "unit": quantity.unit,
-                    "mean": _number(spread.mean),
-                    "p95": _number(spread.p95),
-                    "max": _number(spread.maximum),
+                    "mean": _finite_or_none(spread.mean),
+                    "p95": _finite_or_none(spread.p95),
+                    "max": _finite_or_none(spread.maximum),
                     "target_scans": spread.count,
                 }
                 for quantity in self.ladder.quantities
@@ -197,11 +197,11 @@ class RungCost:
         return row
 
 
-def _number(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-def applies(variants: Variants, block: str, ladder: Ladder) -> str:
+def inapplicable_reason(variants: Variants, block: str, ladder: Ladder) -> str:
     """Return why a ladder changes nothing in this scene; empty when it may."""
     if ladder.applies is None:
         return ""
@@ -227,7 +227,7 @@ def climb(
     """
     reference = against or ladder.reference
     best = Choice(block, ladder, ladder.rung(reference))
-    baselines = {"": _attempt(variants, [best], block, own=own)}
+    baselines = {"": _run_variant(variants, [best], block, own=own)}
     costs: list[RungCost] = []
     runs: dict[str, RungRun] = {reference: baselines[""]}
     for rung in ladder.rungs:
@@ -236,18 +236,18 @@ def climb(
         choice = Choice(block, ladder, rung)
         try:
             if rung.name != reference:
-                runs[rung.name] = _attempt(variants, [choice], block, own=own)
+                runs[rung.name] = _run_variant(variants, [choice], block, own=own)
             shared = str(sorted(rung.shared.items())) if rung.shared else ""
             if shared and shared not in baselines:
-                baselines[shared] = _attempt(variants, [best], block, [choice])
+                baselines[shared] = _run_variant(variants, [best], block, [choice])
         except Unavailable as error:
             runs.pop(rung.name, None)
             cost.unavailable = str(error)
     time_interleaved(list(runs.values()), repeats)
     known: dict[str, Values] = {}
     for key, baseline in baselines.items():
-        known[key] = values_of(ladder, baseline, baseline)
-    targets = max(_targets(known[""], ladder), 1)
+        known[key] = replay_values(ladder, baseline, baseline)
+    targets = max(_count_targets(known[""], ladder), 1)
     for cost, rung in zip(costs, ladder.rungs, strict=True):
         if cost.unavailable:
             continue
@@ -262,14 +262,14 @@ def climb(
         else:
             key = str(sorted(rung.shared.items())) if rung.shared else ""
             baseline = baselines[key]
-            cost.errors = errors_against(ladder, values_of(ladder, run, baseline), known[key])
+            cost.errors = errors_against(ladder, replay_values(ladder, run, baseline), known[key])
             if compare is not None:
                 cost.effect = compare(baseline.tables, run.tables)
-    _mark(costs, budgets or {}, variants.tolerance)
+    _mark_budgets(costs, budgets or {}, variants.tolerance)
     return costs
 
 
-def _attempt(
+def _run_variant(
     variants: Variants,
     choices: list[Choice],
     block: str,
@@ -293,7 +293,7 @@ def _attempt(
         raise Unavailable(error.reason.partition(": ")[2] or error.reason) from error
 
 
-def _targets(values: Values, ladder: Ladder) -> int:
+def _count_targets(values: Values, ladder: Ladder) -> int:
     return int(values[1][ladder.quantities[0].name].shape[1])
 
 
@@ -322,7 +322,7 @@ def _equalise_ties(costs: list[RungCost]) -> None:
             cost.tied_with = [other.rung for other in group if other is not cost]
 
 
-def _mark(
+def _mark_budgets(
     costs: list[RungCost], budgets: Mapping[str, float], tolerance: Mapping[str, float]
 ) -> None:
     known = [cost for cost in costs if not cost.unavailable]

@@ -11,7 +11,7 @@ from typing import Any
 from dsa_des.block.mark import RED
 from dsa_des.costs.climb import Comparison, RungCost, show_number
 from dsa_des.files.output_file import write_file
-from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts, plain_log_ticks
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, plain_log_ticks
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
 from dsa_des.text.safe_text import shorten
@@ -51,13 +51,13 @@ def print_ladder(rungs: Sequence[RungCost], comparison: Comparison) -> None:
     unit = first.ladder.quantities[0]
     what = f"{first.ladder.name}: errors in {unit.name}, {unit.unit}, against {first.reference}"
     console.print()
-    rows = [_cells(cost, comparison) for cost in rungs]
+    rows = [_cost_cells(cost, comparison) for cost in rungs]
     last = len(headings) - 1
     title = f"{shorten(first.block)}, {what}"
     print_table(console, title, headings, rows, below=last, right=range(1, last))
 
 
-def print_rest(
+def print_chain_and_notes(
     chain: Sequence[Mapping[str, Any]], notes: Sequence[str], comparison: Comparison
 ) -> None:
     """Print the front of the whole chain, and notes."""
@@ -68,7 +68,7 @@ def print_rest(
         console.print(f"note: {note}", highlight=False)
 
 
-def _cells(cost: RungCost, comparison: Comparison) -> list[str]:
+def _cost_cells(cost: RungCost, comparison: Comparison) -> list[str]:
     name = cost.rung + (" (scene)" if cost.in_scene else "")
     if cost.unavailable:
         missing = f"not available: {cost.unavailable}"
@@ -77,14 +77,14 @@ def _cells(cost: RungCost, comparison: Comparison) -> list[str]:
     effects = [show_number(change, cost.effect, _NO_ERROR) for change in comparison.changes]
     return [
         name,
-        f"{_plain(cost.cpu_us_per_target_scan)} ± {_plain(cost.cpu_spread_us, 1)}",
-        *(_NO_ERROR if math.isnan(error) else _plain(error) for error in errors),
+        f"{_round_plainly(cost.cpu_us_per_target_scan)} ± {_round_plainly(cost.cpu_spread_us, 1)}",
+        *(_NO_ERROR if math.isnan(error) else _round_plainly(error) for error in errors),
         *effects,
-        "; ".join(_remarks(cost) + comparison.describe_changes(cost.effect)),
+        "; ".join(_cost_notes(cost) + comparison.describe_changes(cost.effect)),
     ]
 
 
-def _remarks(cost: RungCost) -> list[str]:
+def _cost_notes(cost: RungCost) -> list[str]:
     remarks = ["front"] if cost.pareto else []
     if cost.cheapest_inside:
         remarks.append("cheapest inside the budget")
@@ -101,7 +101,7 @@ def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]], comparison: C
     headings = ["us/target-scan", comparison.difference.name, *(c.heading for c in telling)]
     rows = [
         [
-            _plain(row["cpu_us_per_target_scan"]),
+            _round_plainly(row["cpu_us_per_target_scan"]),
             f"{row['error_p95']:.2%}",
             *(show_number(change, row["effect"], _NO_ERROR) for change in telling),
             row["rung"],
@@ -114,7 +114,7 @@ def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]], comparison: C
     print_table(console, title, [*headings, "rungs"], rows, below=last, right=range(last))
 
 
-def _plain(value: float, digits: int = 3) -> str:
+def _round_plainly(value: float, digits: int = 3) -> str:
     """Return a number rounded to so many digits; a large one without a power of ten."""
     text = f"{value:.{digits}g}"
     return f"{float(text):,.0f}" if float(text) >= 10**digits else text
@@ -130,7 +130,7 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
     panels = [rungs for rungs in panels if any(cost.error.count for cost in rungs)]
     columns = min(3, max(1, len(panels)))
     rows = max(1, math.ceil(len(panels) / columns))
-    with drawing(4.3 * columns, 3.5 * rows + 0.5, path) as figure:
+    with draw_to_png(4.3 * columns, 3.5 * rows + 0.5, path) as figure:
         heading = f"{figure_text(title, 80)}: what each model costs and what it gets wrong"
         figure.suptitle("\n".join(wrap(heading, _LETTERS * columns)))
         drawn = []

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dsa_des.block.ladder import Ladder, Unavailable
-from dsa_des.costs.climb import RungCost, applies, climb
+from dsa_des.costs.climb import RungCost, climb, inapplicable_reason
 from dsa_des.costs.replay import run_watched
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.results.folder import StudyFolder
@@ -31,7 +31,10 @@ def scene_record(where: str, scene: Scene) -> SceneRecord:
     for name, component in simulation.components.items():
         block = scene.blocks[name]
         about = (type(component).__doc__ or "").strip().partition("\n")[0]
-        rungs = [_rung(scene, name, ladder) for ladder in block.cls.ladders_for(block.parameters)]
+        rungs = [
+            _rung_of_block(scene, name, ladder)
+            for ladder in block.cls.ladders_for(block.parameters)
+        ]
         models.append(
             ModelRecord(
                 block=name, type=block.type_name, about=about, rungs=list(filter(None, rungs))
@@ -48,7 +51,7 @@ def scene_record(where: str, scene: Scene) -> SceneRecord:
     return SceneRecord(where=where, models=models, effects=effects, spared=spared)
 
 
-def _rung(scene: Scene, name: str, ladder: Ladder) -> str:
+def _rung_of_block(scene: Scene, name: str, ladder: Ladder) -> str:
     """Return which rung of a ladder a block is, as far as its type and keys tell."""
     block = scene.blocks[name]
     table = scene.resolved()["blocks"][name]
@@ -107,7 +110,7 @@ def scene_errors(
     for name, mine in ladders.items():
         for ladder in mine:
             report(f"errors of models: {name}, {ladder.name}")
-            why = applies(variants, name, ladder)
+            why = inapplicable_reason(variants, name, ladder)
             if why:
                 notes.append(f"{name}, {ladder.name}: changes nothing here, {why}")
                 continue

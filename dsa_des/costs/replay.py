@@ -194,7 +194,7 @@ class Spread:
 Values = tuple[IntArray, dict[str, AnyArray]]
 
 
-def values_of(ladder: Ladder, run: RungRun, reference: RungRun) -> Values:
+def replay_values(ladder: Ladder, run: RungRun, reference: RungRun) -> Values:
     """Read a ladder's quantities from a fresh block over all its wakes."""
     block, other = run.fresh(), reference.fresh()
     parts = [(wake.ticks, ladder.measure(block, wake, other)) for wake in run.wakes]

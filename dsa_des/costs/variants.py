@@ -67,7 +67,9 @@ class Variants:
         try:
             return check_scene(scene_file)
         except SceneError as error:
-            raise Unavailable("; ".join(_brief(problem) for problem in error.problems)) from error
+            raise Unavailable(
+                "; ".join(_short_problem_text(problem) for problem in error.problems)
+            ) from error
 
     def _apply(self, scene_file: SceneFile, choice: Choice) -> None:
         block = scene_file.data["blocks"][choice.block]
@@ -77,7 +79,9 @@ class Variants:
         if choice.rung.type_name:
             swap_type(scene_file, choice.block, choice.rung.type_name, COMMAND_LINE)
             if scene_file.problems:
-                raise Unavailable("; ".join(_brief(problem) for problem in scene_file.problems))
+                raise Unavailable(
+                    "; ".join(_short_problem_text(problem) for problem in scene_file.problems)
+                )
         _set_parameters(scene_file, choice.block, values)
         for table, keys in choice.rung.sections.items():
             for key, value in keys.items():
@@ -91,5 +95,5 @@ def _set_parameters(scene_file: SceneFile, block: str, values: Mapping[str, Any]
         scene_file.sources[("blocks", block, key)] = COMMAND_LINE
 
 
-def _brief(problem: Any) -> str:
+def _short_problem_text(problem: Any) -> str:
     return f"{problem.key}: {problem.message}" if problem.key else str(problem.message)

@@ -18,7 +18,7 @@ from networkx import ancestors
 
 from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.component import Input, ends_its_run
+from dsa_des.block.component import Input, may_end_its_run
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.foreign import load_installed
 from dsa_des.block.foreign_calls import is_stop_request
@@ -152,7 +152,7 @@ class HostDriven:
     """
 
     def __init__(self, scene: Scene, source: str, wanted: Iterable[str] | None = None) -> None:
-        problems = list(_refusals(scene, source))
+        problems = list(_unsupported_parts(scene, source))
         if problems:
             raise SceneError(problems)
         self.scene = scene
@@ -298,7 +298,7 @@ class HostDriven:
             if scan is None and not triggered:
                 continue
             own = _NO_SCAN if scan is None else np.array([scan], dtype=np.int64)
-            demand = partial(_rows_of, runner.demands, scans) if runner.demands else None
+            demand = partial(_scanning_rows, runner.demands, scans) if runner.demands else None
             wake = runner.inputs.wake_at(now, own, tick + 1, demand, clock=runner.before, idle=idle)
             if wake is None:
                 continue
@@ -326,14 +326,14 @@ def _last_row(message: Message) -> IntArray:
     return _FIRST_ROW if count == 1 else np.array([count - 1])
 
 
-def _rows_of(
+def _scanning_rows(
     blocks: Iterable[str], scanning: Container[str], asked: RunTicks
 ) -> dict[str, IntArray]:
     """Return for each block the one row of a step where it scans, and none where it does not."""
     return {name: _FIRST_ROW if name in scanning else _NO_ROW for name in blocks}
 
 
-def _refusals(scene: Scene, source: str) -> list[Problem]:
+def _unsupported_parts(scene: Scene, source: str) -> list[Problem]:
     """Say what of a scene needs an event queue."""
     refusals: list[tuple[str, str]] = []
     looped = cycle_numbers(scene.graph)
@@ -352,7 +352,7 @@ def _refusals(scene: Scene, source: str) -> list[Problem]:
             refusals.append((f"blocks.{name}", message))
         if block.cls.process is not None:
             refusals.append((f"blocks.{name}", "it has a process of its own"))
-        if ends_its_run(block.cls):
+        if may_end_its_run(block.cls):
             refusals.append((f"blocks.{name}", "it ends its run, and a host ends when it likes"))
         fed = any(port.required for port in block.cls.inputs.values())
         if not fed and name != source:

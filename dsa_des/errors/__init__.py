@@ -12,7 +12,7 @@ from dsa_des.errors.problems import (
     SetupFailure,
     UsageError,
     did_you_mean,
-    nearest,
+    nearest_name,
     shown_value,
 )
 
@@ -28,6 +28,6 @@ __all__ = [
     "SetupFailure",
     "UsageError",
     "did_you_mean",
-    "nearest",
+    "nearest_name",
     "shown_value",
 ]

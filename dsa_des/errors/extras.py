@@ -6,7 +6,7 @@ from typing import Any
 from dsa_des.errors.problems import UsageError
 
 
-def library(module: str, extra: str, what: str) -> Any:
+def import_extra(module: str, extra: str, what: str) -> Any:
     """Return a library of an extra; where it is missing, `UsageError` says how to install it."""
     try:
         return import_module(module)

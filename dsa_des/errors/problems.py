@@ -23,7 +23,7 @@ _LONGEST_NAME = 100
 _MOST_NAMES = 2000
 
 
-def nearest(name: str, allowed: Iterable[str]) -> str | None:
+def nearest_name(name: str, allowed: Iterable[str]) -> str | None:
     """Return the allowed name closest to a misspelt one, or None when nothing is close."""
     if len(name) > _LONGEST_NAME:
         return None
@@ -38,7 +38,7 @@ def nearest(name: str, allowed: Iterable[str]) -> str | None:
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:
     """Return ``"; did you mean 'x'?"`` or, when nothing is close, the list of what is allowed."""
     names = sorted(allowed)
-    close = nearest(name, names)
+    close = nearest_name(name, names)
     if close is not None:
         return f"; did you mean {close!r}?"
     if not names:

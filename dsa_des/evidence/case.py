@@ -15,13 +15,13 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 from dsa_des.block.component import Parameters, ScenePath
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.results.record import Result
-from dsa_des.scene.keys import flat, key_in
+from dsa_des.scene.keys import flatten_tables, parse_key_path
 from dsa_des.scene.overrides import apply_sets
-from dsa_des.scene.parameter_errors import explain
+from dsa_des.scene.parameter_errors import explain_validation_error
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.identity import results_of
-from dsa_des.studies.study import Study, set_text
+from dsa_des.studies.study import Study, format_set_value
 from dsa_des.studies.study_file import read_study
 from dsa_des.text.run_commands import format_value
 
@@ -192,7 +192,7 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
     try:
         tables = CaseTables.model_validate(file.data)
     except ValidationError as error:
-        raise SceneError(explain(file, (), "a case", CaseTables, error)) from None
+        raise SceneError(explain_validation_error(file, (), "a case", CaseTables, error)) from None
     asked = [one.name for one in tables.requirements]
     for index, name in enumerate(asked):
         if name in asked[:index]:
@@ -205,11 +205,11 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
             raise SceneError([file.problem(("beside", index, "name"), "is given twice", one.name)])
         many = one.replicas or replicas
         changed = [f"replicas={many}"] if many else []
-        changed += _set_of_system(tables) if one.of_system else []
+        changed += _sets_of_system(tables) if one.of_system else []
         studies[one.name] = read_study(one.study, sets=changed)
     varied: tuple[tuple[SensitivityKey, Any, str], ...] = ()
     if tables.sensitivity:
-        varied, studies[SENSITIVITY] = _sensitivity(file, tables, studies[ASSESSED])
+        varied, studies[SENSITIVITY] = _sensitivity_study(file, tables, studies[ASSESSED])
     results = {name: {r.name: r for r in results_of(study)} for name, study in studies.items()}
     case = EvidenceCase(file, tables, studies, results, varied)
     _check_results(case)
@@ -218,20 +218,22 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
     return case
 
 
-def _set_of_system(tables: CaseTables) -> list[str]:
-    return [f"set.{key}={set_text(value)}" for key, value in flat(tables.set).items()]
+def _sets_of_system(tables: CaseTables) -> list[str]:
+    return [
+        f"set.{key}={format_set_value(value)}" for key, value in flatten_tables(tables.set).items()
+    ]
 
 
 def _load_system_study(file: SceneFile, tables: CaseTables, replicas: int | None) -> Study:
     sets = [f"replicas={replicas}"] if replicas else []
-    study = read_study(tables.study, sets=[*sets, *_set_of_system(tables)])
+    study = read_study(tables.study, sets=[*sets, *_sets_of_system(tables)])
     if len(study.cells) != 1:
         message = f"has {len(study.cells)} cells; a case is one: a study without axes"
         raise SceneError([file.problem(("study",), message, str(file.data["study"]))])
     return study
 
 
-def _sensitivity(
+def _sensitivity_study(
     file: SceneFile, tables: CaseTables, assessed: Study
 ) -> tuple[tuple[tuple[SensitivityKey, Any, str], ...], Study]:
     """Return the changes of one parameter at a time, and the study of them."""
@@ -239,7 +241,7 @@ def _sensitivity(
     stated: dict[str, Any] = {}
     for index, one in enumerate(tables.sensitivity):
         result: Any = scene
-        for part in key_in(scene, one.key):
+        for part in parse_key_path(scene, one.key):
             inside = isinstance(result, dict) and part in result
             if not inside and not (isinstance(result, list) and isinstance(part, int)):
                 known = list(result) if isinstance(result, dict) else []
@@ -263,12 +265,12 @@ def _sensitivity(
         "replicas": min(tables.sensitivity_replicas, assessed.replicas),
         "figures": [], "requirements": [],
     }  # fmt: skip
-    return varied, read_study(tables.study, sets=_set_of_system(tables), keys=keys)
+    return varied, read_study(tables.study, sets=_sets_of_system(tables), keys=keys)
 
 
 def case_value(value: Any) -> str:
     """Return a value as a case's lines show it: as a scene would hold it."""
-    return set_text(value) if isinstance(value, list | dict) else format_value(value)
+    return format_set_value(value) if isinstance(value, list | dict) else format_value(value)
 
 
 def _check_results(case: EvidenceCase) -> None:
@@ -311,7 +313,7 @@ def _check_limit(case: EvidenceCase, at: tuple[str, int], study: str, result: st
 def _check_sources(case: EvidenceCase) -> None:
     """Report every block whose scene states a value that no source covers."""
     sources, scene = case.tables.sources, case.system_study.scene(0)
-    for key in flat(sources):
+    for key in flatten_tables(sources):
         parts = key.removeprefix("blocks.").split(".")
         if parts[0] not in {*scene.blocks, WIRES}:
             hint = did_you_mean(parts[0], [*scene.blocks, WIRES])
@@ -338,5 +340,7 @@ def wires_with_options(scene: Scene) -> list[dict[str, Any]]:
 
 def source_of(sources: Mapping[str, Any], block: str, key: str) -> str | None:
     """Return where a parameter's value is from: that of the key, or else of its block."""
-    known = {name.removeprefix("blocks."): str(text) for name, text in flat(sources).items()}
+    known = {
+        name.removeprefix("blocks."): str(text) for name, text in flatten_tables(sources).items()
+    }
     return known.get(f"{block}.{key}", known.get(block))

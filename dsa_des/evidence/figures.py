@@ -8,7 +8,7 @@ import numpy as np
 
 from dsa_des.block.mark import BLUE, RED, SKY
 from dsa_des.evidence.findings import Finding, ParameterChange
-from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts, plain_log_ticks
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, plain_log_ticks
 
 _BAND, _LINE, _LIMIT, _RULE = SKY, BLUE, RED, "#999999"
 _MOST_BARS = 24
@@ -18,7 +18,7 @@ _LONGEST = 60
 def draw_convergence(findings: Sequence[Finding], confidence: float) -> bytes:
     """Return a PNG: the running estimate of every requirement with its interval and its limit."""
     drawn = io.BytesIO()
-    with drawing(8.6, 2.9 * len(findings) + 0.3, drawn) as figure:
+    with draw_to_png(8.6, 2.9 * len(findings) + 0.3, drawn) as figure:
         grid = figure.subplots(len(findings), 1, squeeze=False)[:, 0]
         for axes, one in zip(grid, findings, strict=True):
             c, asked = one.convergence, one.requirement
@@ -55,7 +55,7 @@ def draw_sensitivity(changes: Sequence[ParameterChange]) -> bytes:
     drawn = io.BytesIO()
     results = list(dict.fromkeys(one.result for one in changes))
     rows = list(dict.fromkeys((one.key, one.value) for one in changes))[:_MOST_BARS]
-    with drawing(8.6, 0.32 * len(rows) + 1.3, drawn) as figure:
+    with draw_to_png(8.6, 0.32 * len(rows) + 1.3, drawn) as figure:
         grid = figure.subplots(1, len(results), squeeze=False, sharey=True)[0]
         places = {row: len(rows) - 1 - k for k, row in enumerate(rows)}
         for axes, result in zip(grid, results, strict=True):

@@ -161,13 +161,13 @@ def _stated_values(case: EvidenceCase) -> dict[str, str]:
     return {key: case_value(value) for key, value in axis.sets[index]}
 
 
-def first_line(findings: Sequence[Finding]) -> str:
+def verdict_line(findings: Sequence[Finding]) -> str:
     """Return the verdict in a line: what is not known, or else what does not pass, comes first."""
     by: dict[str, list[Finding]] = {}
     for one in findings:
         by.setdefault(one.verdict, []).append(one)
     if NOT_KNOWN in by:
-        return "No verdict: " + "; ".join(_unknown(one) for one in by[NOT_KNOWN]) + "."
+        return "No verdict: " + "; ".join(_unknown_reason(one) for one in by[NOT_KNOWN]) + "."
     parts = []
     if fails := [*by.get(NOT_MET, []), *by.get(NOT_SHOWN, [])]:
         parts.append("Does not pass: " + "; ".join(map(_describe_finding, fails)) + ".")
@@ -183,7 +183,7 @@ def _describe_finding(one: Finding) -> str:
     return f"{asked.name} {interval}, asked {asked.describe_limit()}{shown}"
 
 
-def _unknown(one: Finding) -> str:
+def _unknown_reason(one: Finding) -> str:
     c, asked = one.convergence, one.requirement
     if math.isnan(one.line.estimate.value):
         ratio = one.line.ratio

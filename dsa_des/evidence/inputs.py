@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.ladder import Verified
-from dsa_des.block.shipped_files import folders
+from dsa_des.block.shipped_files import example_folders
 from dsa_des.evidence.case import WIRES, EvidenceCase, case_value, source_of, wires_with_options
 from dsa_des.results.folder import StudyFolder
 from dsa_des.scene.scene_file import COMMAND_LINE, read_scene_file
@@ -55,26 +55,26 @@ class CaseFiles:
 def files_of_case(case: EvidenceCase) -> CaseFiles:
     """Return the files that a case and its studies read."""
     own = Path(os.path.abspath(case.file.path))
-    paths = {own, *_paths(case.file.sources.values())}
+    paths = {own, *_existing_paths(case.file.sources.values())}
     for study in case.studies.values():
-        paths |= {Path(os.path.abspath(study.path)), *_paths(study.base.sources.values())}
-        paths |= set(_paths(read_scene_file(study.path).sources.values()))
+        paths |= {Path(os.path.abspath(study.path)), *_existing_paths(study.base.sources.values())}
+        paths |= set(_existing_paths(read_scene_file(study.path).sources.values()))
         paths |= {Path(os.path.abspath(path)) for path in files_of(study)}
-    shipped = [Path(os.path.abspath(folder)) for folder in folders()]
+    shipped = [Path(os.path.abspath(folder)) for folder in example_folders()]
     home = next((folder for folder in shipped if own.is_relative_to(folder)), None)
     mine = [p for p in paths if not any(p.is_relative_to(folder) for folder in shipped)]
     root = home or Path(os.path.commonpath([path.parent for path in mine]))
-    names = {path: _name_below(path, [root, *shipped]) for path in sorted(paths)}
+    names = {path: _relative_name(path, [root, *shipped]) for path in sorted(paths)}
     return CaseFiles(root, names, names[own])
 
 
-def _name_below(path: Path, folders: Iterable[Path]) -> str:
+def _relative_name(path: Path, folders: Iterable[Path]) -> str:
     """Return a file's name below the first of some folders that holds it, or its last part."""
     inside = [folder for folder in folders if path.is_relative_to(folder)]
     return path.relative_to(inside[0]).as_posix() if inside else path.name
 
 
-def _paths(sources: Iterable[str]) -> list[Path]:
+def _existing_paths(sources: Iterable[str]) -> list[Path]:
     return [Path(os.path.abspath(source)) for source in set(sources) if source != COMMAND_LINE]
 
 

@@ -12,8 +12,8 @@ from dsa_des.evidence.findings import (
     ParameterChange,
     changes_of,
     findings_of,
-    first_line,
     numbers_of,
+    verdict_line,
 )
 from dsa_des.evidence.inputs import (
     CaseFiles,
@@ -43,7 +43,7 @@ class Pack:
         self.files: CaseFiles = files_of_case(case)
         self.findings: list[Finding] = findings_of(case, tables)
         self.changes: list[ParameterChange] = changes_of(case, tables)
-        self.line = first_line(self.findings)
+        self.line = verdict_line(self.findings)
         words = ["dsa-des", "evidence", f"{INPUTS}/{self.files.case}"]
         words += [word for one in sets for word in ("--set", one)]
         words += ["--encounters", str(replicas)] if replicas else []
@@ -68,7 +68,7 @@ class Pack:
             "sample": self._sample(),
             "convergence": {
                 "rule": tables.convergence.text(),
-                "estimates": [_running(one) for one in self.findings],
+                "estimates": [_convergence_as_dict(one) for one in self.findings],
             },
             "sensitivity": [_change_as_dict(one) for one in self.changes],
             "sensitivity_encounters": self._units(SENSITIVITY),
@@ -136,7 +136,7 @@ class Pack:
         }  # fmt: skip
 
 
-def _running(one: Finding) -> dict[str, Any]:
+def _convergence_as_dict(one: Finding) -> dict[str, Any]:
     c: Convergence = one.convergence
     return {
         "requirement": one.requirement.name, "rule_counts_from": c.last_from,

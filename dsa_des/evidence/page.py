@@ -10,7 +10,7 @@ from typing import Any
 from markupsafe import Markup
 
 from dsa_des.evidence.inputs import DEFAULT
-from dsa_des.results.labels import readable, short
+from dsa_des.results.labels import readable_label, short_text
 from dsa_des.results.report import PAGE_HEAD, page_environment, page_part
 from dsa_des.text.safe_text import printable
 
@@ -27,35 +27,37 @@ def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes |
         e=e, title=e["case"]["title"], verdict=_escape_whole(e["verdict"]["line"]),
         level=f"{100 * confidence:g} %",
         requirements=[
-            (r["name"], f"at {r['sense']} {r['limit']:g} {r['unit']}", _number(r["value"]),
-             _interval(r), r["verdict"])
+            (r["name"], f"at {r['sense']} {r['limit']:g} {r['unit']}", _number_text(r["value"]),
+             _interval_text(r), r["verdict"])
             for r in e["requirements"]
         ],
         asked=[(r["name"], r["text"], r["source"]) for r in e["requirements"]],
         ratios=[
-            (readable(r["result"]), *(_number(r[k]) for k in ("value", "unresolved", "induced")),
+            (readable_label(r["result"]), *(_number_text(r[k]) for k in ("value", "unresolved",
+            "induced")),
              f"{r['nominal_events']}, {r['mitigated_events']}, {r['induced_events']}",
-             f"{_number(r['effective_sample_size'])} of {r['encounters']}")
+             f"{_number_text(r['effective_sample_size'])} of {r['encounters']}")
             for r in lines if "unresolved" in r
         ],
-        also=[(readable(r["result"]), _number(r["value"]), _interval(r), r["meaning"])
+        also=[(readable_label(r["result"]), _number_text(r["value"]), _interval_text(r),
+        r["meaning"])
               for r in e["also"]],
-        beside_heads=("system", *map(readable, names)), beside=_comparison_rows(e, names),
+        beside_heads=("system", *map(readable_label, names)), beside=_comparison_rows(e, names),
         sample=[
             ("model", e["sample"]["model"]), ("licence", e["sample"]["licence"]),
             ("weights", e["sample"]["weights"]), ("encounters", e["sample"]["encounters"]),
-            ("effective number by the weights", _number(e["sample"]["effective_sample_size"])),
+            ("effective number by the weights", _number_text(e["sample"]["effective_sample_size"])),
             ("drawn for each", ", ".join(e["sample"]["drawn"])),
         ],
         settled=[
-            (c["requirement"], _number(c["moved"]), _number(c["may_move"]),
+            (c["requirement"], _number_text(c["moved"]), _number_text(c["may_move"]),
              f"{c['rule_counts_from']} to {c['encounters'][-1]}",
              "holds" if r["converged"] else "does not hold")
             for c, r in zip(e["convergence"]["estimates"], e["requirements"], strict=True)
         ],
         changes=[
-            (c["key"], c["as_stated"], f"{c['value']} ({c['unit']})", readable(c["result"]),
-             _number(c["difference"]), _interval(c))
+            (c["key"], c["as_stated"], f"{c['value']} ({c['unit']})", readable_label(c["result"]),
+             _number_text(c["difference"]), _interval_text(c))
             for c in e["sensitivity"]
         ],
         convergence=base64.b64encode(convergence).decode(),
@@ -112,16 +114,17 @@ def _comparison_rows(e: Mapping[str, Any], names: list[str]) -> list[tuple[str, 
         known = {r["result"]: r for r in results}
         if not known.keys() & set(names):
             continue
-        cells = [f"{_number(known[n]['value'])} ({_interval(known[n])})" if n in known else "-"
+        cells = [f"{_number_text(known[n]['value'])} ({_interval_text(known[n])})"
+        if n in known else "-"
                  for n in names]  # fmt: skip
         cells_of.append((name, *cells))
     return cells_of
 
 
-def _number(value: Any) -> str:
+def _number_text(value: Any) -> str:
     known = value is not None and not (isinstance(value, float) and math.isnan(value))
-    return short(float(f"{value:.3g}")) if known else "-"
+    return short_text(float(f"{value:.3g}")) if known else "-"
 
 
-def _interval(row: Mapping[str, Any]) -> str:
-    return f"{_number(row['low'])} to {_number(row['high'])}"
+def _interval_text(row: Mapping[str, Any]) -> str:
+    return f"{_number_text(row['low'])} to {_number_text(row['high'])}"

@@ -48,7 +48,7 @@ def resolve_home(text: str) -> Path:
         raise InputFileError(f"there is no home folder of {user[:80]!r}") from None
 
 
-def status_of(path: Path, largest_bytes: int = LARGEST_BYTES) -> os.stat_result:
+def readable_file_status(path: Path, largest_bytes: int = LARGEST_BYTES) -> os.stat_result:
     """Return the status of a regular file that may be read."""
     try:
         status = path.stat()
@@ -57,7 +57,7 @@ def status_of(path: Path, largest_bytes: int = LARGEST_BYTES) -> os.stat_result:
     except ValueError:
         raise InputFileError("holds a NUL character: no file can have such a name") from None
     except OSError as error:
-        raise InputFileError(f"cannot be read: {_reason(error)}") from None
+        raise InputFileError(f"cannot be read: {_read_error_text(error)}") from None
     if not stat.S_ISREG(status.st_mode):
         kind = next((what for is_kind, what in _KINDS if is_kind(status.st_mode)), "no file")
         raise InputFileError(f"is {kind}: a regular file is needed")
@@ -71,14 +71,14 @@ def status_of(path: Path, largest_bytes: int = LARGEST_BYTES) -> os.stat_result:
 
 def read_input_bytes(path: Path, largest_bytes: int = LARGEST_BYTES) -> bytes:
     """Return what is in a regular file."""
-    size = status_of(path, largest_bytes).st_size
+    size = readable_file_status(path, largest_bytes).st_size
     try:
         with path.open("rb") as file:
             content = file.read(size + 1)
             if len(content) != size:  # those of /proc say that they are empty and are not
                 content += file.read(largest_bytes)
     except OSError as error:
-        raise InputFileError(f"cannot be read: {_reason(error)}") from None
+        raise InputFileError(f"cannot be read: {_read_error_text(error)}") from None
     if len(content) > largest_bytes:
         raise InputFileError(f"holds more than {largest_bytes / 2**20:,.0f} MB")
     return content
@@ -95,7 +95,7 @@ def read_input_text(path: Path, largest_bytes: int = LARGEST_BYTES) -> str:
     return text.replace("\r\n", "\n")
 
 
-def read_once(most: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def cache_reads(most: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Make a reader of a file keep what it returned for the files that were read last.
 
     A file, or several in a tuple, is read again when its size or the time of its last change is
@@ -136,5 +136,5 @@ def is_folder(path: Path) -> bool:
         return False
 
 
-def _reason(error: OSError) -> str:
+def _read_error_text(error: OSError) -> str:
     return (error.strerror or type(error).__name__).lower()

@@ -124,7 +124,7 @@ def temporary_folder(target: Path) -> Iterator[Path]:
     try:
         with defer_signals():
             remove_abandoned(target.parent)
-            folder, lock = _new_folder(target)
+            folder, lock = _make_temporary_folder(target)
         yield folder
     finally:
         with defer_signals():
@@ -142,7 +142,7 @@ def temporary_path(path: Path) -> Path:
     return path.parent / f"{PREFIX}{os.urandom(6).hex()}"
 
 
-def _new_folder(target: Path) -> tuple[Path, int | None]:
+def _make_temporary_folder(target: Path) -> tuple[Path, int | None]:
     for _ in range(_TRIES):
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -165,10 +165,10 @@ def _new_folder(target: Path) -> tuple[Path, int | None]:
 
 
 def _process_marker(target: Path) -> dict[str, Any]:
-    return {"dsa_des": _WHAT, "host": _host(), "target": target.name}
+    return {"dsa_des": _WHAT, "host": _host_name(), "target": target.name}
 
 
-def _host() -> str:
+def _host_name() -> str:
     return os.uname().nodename if hasattr(os, "uname") else ""
 
 
@@ -222,7 +222,7 @@ def _remove_abandoned(folder: Path) -> None:
             shutil.rmtree(folder, ignore_errors=True)
             return
         about = json.loads(content)
-        if about["dsa_des"] != _WHAT or about["host"] != _host():
+        if about["dsa_des"] != _WHAT or about["host"] != _host_name():
             return
         back = folder.parent / Path(about["target"]).name
         if (folder / EARLIER).is_dir() and not os.path.lexists(back):

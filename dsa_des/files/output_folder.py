@@ -16,10 +16,10 @@ from typing import Any
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import EARLIER, temporary_folder
 from dsa_des.files.output_names import (
-    check_place,
+    absolute_location,
+    check_folder_path,
     claim_folder,
     describe_write_error,
-    location_of,
     new_folder_name,
     reason_of,
     user_path,
@@ -32,9 +32,11 @@ _FILES = "files"
 _MOST_READ = 1 << 20
 
 
-def with_files(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
+def add_file_list(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
     """Return the content of ``run.json`` with the list of all files that are in the folder."""
-    files = {name: _digest(folder / name) for name in _names(folder) if name != RUN_JSON}
+    files = {
+        name: _quick_digest(folder / name) for name in _file_names_below(folder) if name != RUN_JSON
+    }
     return {**content, _FILES: files}
 
 
@@ -44,14 +46,14 @@ def foreign_files(folder: Path) -> list[str]:
     All of it if the folder holds no ``run.json`` of ours; nothing if it is empty. A file that was
     changed since is not what we wrote.
     """
-    names = list(_names(folder))
+    names = list(_file_names_below(folder))
     files = _read_listing(folder / RUN_JSON)
     if files is None:
         return names
     return [
         name
         for name in names
-        if name != RUN_JSON and (name not in files or files[name] != _digest(folder / name))
+        if name != RUN_JSON and (name not in files or files[name] != _quick_digest(folder / name))
     ]
 
 
@@ -66,16 +68,16 @@ def _read_listing(path: Path) -> dict[str, str] | None:
     return files if isinstance(files, dict) else None
 
 
-def _names(folder: Path) -> Iterator[str]:
+def _file_names_below(folder: Path) -> Iterator[str]:
     """Give the names of all files below a folder, and of folders that hold none, sorted."""
     for entry in sorted(os.scandir(folder), key=lambda entry: entry.name):
         inside = None
         if entry.is_dir(follow_symlinks=False):
-            inside = [f"{entry.name}/{name}" for name in _names(Path(entry.path))]
+            inside = [f"{entry.name}/{name}" for name in _file_names_below(Path(entry.path))]
         yield from inside or [entry.name]
 
 
-def _digest(path: Path) -> str:
+def _quick_digest(path: Path) -> str:
     """Return a digest of a file's length and its first MiB, or what it is instead of a file.
 
     Tables may be larger than memory; an edit of one changes its length or its beginning.
@@ -111,8 +113,8 @@ class OutputFolder:
 
     def check(self) -> None:
         """Raise UsageError unless the results can go there."""
-        check_place(self.path)
-        if self._stem is None and (reason := _replace_refusal(location_of(self.path))):
+        check_folder_path(self.path)
+        if self._stem is None and (reason := _replace_refusal(absolute_location(self.path))):
             raise UsageError(f"--out {self.path}: {reason}; choose a new name")
 
     @contextmanager
@@ -122,8 +124,8 @@ class OutputFolder:
         When the block raises, nothing is left behind.
         """
         self.check()
-        path = location_of(self.path)
-        before = _identity(path)
+        path = absolute_location(self.path)
+        before = _folder_fingerprint(path)
         ready = False
         try:
             with temporary_folder(path) as folder:
@@ -165,9 +167,9 @@ class OutputFolder:
     ) -> None:
         """Replace what was there when we began, and nothing else."""
         reason: str | None = "has come to be there while the results were made"
-        if _identity(path) is None:
+        if _folder_fingerprint(path) is None:
             reason = None
-        elif _identity(path) == before:
+        elif _folder_fingerprint(path) == before:
             reason = _move_aside(path, earlier)
         if reason is None:
             try:
@@ -196,7 +198,7 @@ def new_folder(out: str | None, parent: Path, stem: str) -> Iterator[Path]:
     if out is None:
         folder = claim_folder(parent, stem)
         made.insert(0, folder)
-    elif _make(folder):
+    elif _make_empty_folder(folder):
         made.insert(0, folder)
     try:
         yield folder
@@ -207,12 +209,12 @@ def new_folder(out: str | None, parent: Path, stem: str) -> Iterator[Path]:
                     one.rmdir()
 
 
-def _make(folder: Path) -> bool:
+def _make_empty_folder(folder: Path) -> bool:
     """Make a folder unless an empty one is there; return whether it was made."""
     try:
         if os.path.lexists(folder) and (not folder.is_dir() or any(folder.iterdir())):
             raise UsageError(f"--out {folder}: is there already; a new folder is needed")
-        check_place(folder)
+        check_folder_path(folder)
         new = not folder.exists()
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -248,7 +250,7 @@ def _replace_refusal(path: Path) -> str | None:
     return f"is a folder that holds something other than a run: {shown}"
 
 
-def _identity(path: Path) -> tuple[int, ...] | None:
+def _folder_fingerprint(path: Path) -> tuple[int, ...] | None:
     """Return what tells a folder from another one and from a later state of itself."""
     try:
         about = path.lstat()

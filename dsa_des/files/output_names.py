@@ -91,14 +91,14 @@ def claim_folder(parent: Path, stem: str) -> Path:
         return folder
 
 
-def location_of(folder: Path) -> Path:
+def absolute_location(folder: Path) -> Path:
     """Return where a folder is, without links above it, whatever the working directory becomes."""
     if folder.name in ("", ".."):
         return Path(os.path.realpath(folder))
     return Path(os.path.realpath(folder.parent)) / folder.name
 
 
-def check_place(folder: Path, option: str = "--out") -> None:
+def check_folder_path(folder: Path, option: str = "--out") -> None:
     """Raise UsageError unless a folder can be made at this path, or one is there to be used.
 
     What is in a folder that is there is not looked at.
@@ -108,14 +108,14 @@ def check_place(folder: Path, option: str = "--out") -> None:
     try:
         if ".." in folder.parts:
             folder.parent.lstat()  # it must be there: .. leads out of nothing that is not
-        reason = _place_refusal(location_of(folder))
+        reason = _folder_path_refusal(absolute_location(folder))
     except OSError as error:
         reason = f"cannot be written: {reason_of(error)}"
     if reason is not None:
         raise UsageError(f"{option} {folder}: {reason}")
 
 
-def _place_refusal(path: Path) -> str | None:
+def _folder_path_refusal(path: Path) -> str | None:
     try:
         kind = path.lstat().st_mode
     except FileNotFoundError:

@@ -57,7 +57,7 @@ _ZEROS = b"0" * _DIGITS
 ABOUT = b"dsa_des.about"
 
 
-def parquet(table: "pa.Table", about: bytes = b"") -> bytes:
+def sealable_parquet(table: "pa.Table", about: bytes = b"") -> bytes:
     """Return a table as the bytes of a Parquet file that can be sealed.
 
     `about` says something of all its rows; it stands in the metadata of the table that is read.
@@ -72,12 +72,12 @@ def parquet(table: "pa.Table", about: bytes = b"") -> bytes:
     return buffer.getvalue()
 
 
-def seal(content: bytes, owner: str) -> bytes:
+def seal_content(content: bytes, owner: str) -> bytes:
     """Return a file of `parquet` with its digest; `owner` says whose it is."""
     index = _seal_start(content)
     if index is None:
         raise ValueError("cannot be sealed: it was not written by parquet()")
-    digest = _digest(content, index, owner)
+    digest = _seal_digest(content, index, owner)
     return content[:index] + digest + content[index + _DIGITS :]
 
 
@@ -86,7 +86,7 @@ def is_sealed(content: bytes, owner: str) -> bool:
     index = _seal_start(content)
     if index is None:
         return False
-    return content[index : index + _DIGITS] == _digest(content, index, owner)
+    return content[index : index + _DIGITS] == _seal_digest(content, index, owner)
 
 
 def _seal_start(content: bytes) -> int | None:
@@ -96,7 +96,7 @@ def _seal_start(content: bytes) -> int | None:
     return None if start < 0 or end > len(content) else start + len(_MARK)
 
 
-def _digest(content: bytes, index: int, owner: str) -> bytes:
+def _seal_digest(content: bytes, index: int, owner: str) -> bytes:
     digest = hashlib.sha256(owner.encode() + b"\0")
     digest.update(memoryview(content)[:index])
     digest.update(_ZEROS)

@@ -96,42 +96,42 @@ _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 def to_toml(tables: Mapping[str, Any]) -> str:
     """Return the tables as TOML text; values come before the tables they stand beside."""
     lines: list[str] = []
-    _table(tables, (), lines)
+    _append_table(tables, (), lines)
     return "\n".join(lines).strip() + "\n"
 
 
-def _table(table: Mapping[str, Any], path: tuple[str, ...], lines: list[str]) -> None:
+def _append_table(table: Mapping[str, Any], path: tuple[str, ...], lines: list[str]) -> None:
     nested = {key: value for key, value in table.items() if isinstance(value, Mapping)}
     for key, value in table.items():
         if key not in nested:
-            lines.append(f"{_key(key)} = {inline(value)}")
+            lines.append(f"{_toml_key(key)} = {inline_toml(value)}")
     for key, value in nested.items():
         inner = (*path, key)
-        lines += ["", f"[{'.'.join(_key(part) for part in inner)}]"]
-        _table(value, inner, lines)
+        lines += ["", f"[{'.'.join(_toml_key(part) for part in inner)}]"]
+        _append_table(value, inner, lines)
 
 
-def _key(key: str) -> str:
-    return key if key and set(key) <= _BARE else _text(key)
+def _toml_key(key: str) -> str:
+    return key if key and set(key) <= _BARE else _toml_text(key)
 
 
-def _text(text: str) -> str:
+def _toml_text(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def inline(value: Any) -> str:
+def inline_toml(value: Any) -> str:
     """Return one value as TOML text."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return _text(str(value))
+        return _toml_text(str(value))
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, Mapping):
-        items = ", ".join(f"{_key(key)} = {inline(item)}" for key, item in value.items())
+        items = ", ".join(f"{_toml_key(key)} = {inline_toml(item)}" for key, item in value.items())
         return f"{{{items}}}" if items else "{}"
     if isinstance(value, list | tuple):
-        texts = [inline(item) for item in value]
+        texts = [inline_toml(item) for item in value]
         if sum(map(len, texts)) > 80:
             return "[\n" + "".join(f"  {text},\n" for text in texts) + "]"
         return f"[{', '.join(texts)}]"

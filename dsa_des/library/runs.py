@@ -16,8 +16,8 @@ from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import Run, read_run
 from dsa_des.record.sinks import MemorySink, ObserverSink
-from dsa_des.running.recorded_run import info_of, record_run, summary_of
-from dsa_des.running.reports import Report, draw_all, load_reports, notes_of_scene
+from dsa_des.running.recorded_run import record_run, run_json_content, summarise_run
+from dsa_des.running.reports import Report, draw_all_reports, load_reports, notes_of_scene
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
@@ -86,9 +86,11 @@ def _run_in_memory(
     recorder.sinks.append(observers)
     started = time.perf_counter()
     outcome = simulation.run(progress)
-    summary = summary_of(observers, outcome, None, notes)
+    summary = summarise_run(observers, outcome, None, notes)
     text = to_toml(scene.resolved())
-    info = info_of(simulation, recorder, outcome, summary, text, time.perf_counter() - started)
+    info = run_json_content(
+        simulation, recorder, outcome, summary, text, time.perf_counter() - started
+    )
     if noted or notes:
         info["notes"] = [*noted, *notes]
     said = notes_of(simulation.recorded_messages(), text, scene.seed, simulation.ticks_per_s)
@@ -107,7 +109,7 @@ def _draw_reports(
         for name, table in tables.items():
             pq.write_table(table, folder / f"{name}.parquet")
         with keep_figures() as result:
-            notes = draw_all(reports, simulation, folder, summary)
+            notes = draw_all_reports(reports, simulation, folder, summary)
     if notes and not result:
         raise UsageError("; ".join(notes))
     return dict(sorted(result.items()))

@@ -45,7 +45,7 @@ def load_scene(
     changes, problems = read_changes(sets, swaps, seed, duration_s)
     if problems:
         raise SceneError(problems)
-    return changed_tables(_tables_of(source), tuple(changes))
+    return changed_tables(_read_source(source), tuple(changes))
 
 
 def scene_of_any(source: "Scene | str | os.PathLike[str] | Mapping[str, Any]") -> Scene:
@@ -53,7 +53,7 @@ def scene_of_any(source: "Scene | str | os.PathLike[str] | Mapping[str, Any]") -
     return source if isinstance(source, Scene) else load_scene(source)
 
 
-def _tables_of(source: str | os.PathLike[str] | Mapping[str, Any]) -> SceneFile:
+def _read_source(source: str | os.PathLike[str] | Mapping[str, Any]) -> SceneFile:
     if isinstance(source, Mapping):
         try:
             return read_scene_tables(scene_value(source), _TABLE)

@@ -16,7 +16,7 @@ from dsa_des.library.scenes import scene_of_any
 from dsa_des.record.drawing import keep_figures, pictures_in
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.printing import show
+from dsa_des.results.printing import print_study_tables
 from dsa_des.results.tables import DIFFERENCES, SUMMARY
 from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.overrides import SWAP, Change, apply_changes, scene_value
@@ -105,10 +105,10 @@ class StudyResult:
         return table
 
     def _repr_html_(self) -> str:
-        return html_of(lambda console: show(console, self._tables))
+        return html_of(lambda console: print_study_tables(console, self._tables))
 
     def __str__(self) -> str:
-        return text_of(lambda console: show(console, self._tables), 160)
+        return text_of(lambda console: print_study_tables(console, self._tables), 160)
 
     def __repr__(self) -> str:
         rows = self._tables.rows
@@ -185,7 +185,9 @@ def study(
     if metrics is None:
         keys = {"axes": axes, "draws": draws, "replicas": replicas, "seed": seed, **more}
         described = _study_of_file(scene, {k: v for k, v in keys.items() if v is not None}, sets)
-        return _run_study(described, _workers(described, workers), out, resume, progress)
+        return _run_study(
+            described, _default_worker_count(described, workers), out, resume, progress
+        )
     if sets := list(sets):
         message = "changes a study file; a scene is changed with load_scene(..., sets=...)"
         raise SceneError([Problem("study", "sets", message, sets)])
@@ -199,13 +201,13 @@ def study(
         "metrics": list(metrics),
         **more,
     }
-    tables = _tables(given)
+    tables = _keywords_as_tables(given)
     for key in {"scene", "set", "swap"} & tables.keys():
         message = "is no keyword: give a scene, and change it with scene.set and scene.swap"
         raise SceneError([Problem("study", key, message)])
-    described = study_of_tables(tables, *_base_of(*loaded.origin))
+    described = study_of_tables(tables, *_split_changes(*loaded.origin))
     described.repeat = _BY_A_PROGRAM
-    return _run_study(described, _workers(described, workers), out, resume, progress)
+    return _run_study(described, _default_worker_count(described, workers), out, resume, progress)
 
 
 def _study_of_file(source: Any, given: Mapping[str, Any], sets: Iterable[str]) -> Study:
@@ -215,7 +217,7 @@ def _study_of_file(source: Any, given: Mapping[str, Any], sets: Iterable[str]) -
         raise SceneError([Problem("study", "metrics", message)])
     name = os.fspath(source)
     path = find_input_file(name, "study")
-    described = read_study(path, sets=(sets := list(sets)), keys=_tables(given))
+    described = read_study(path, sets=(sets := list(sets)), keys=_keywords_as_tables(given))
     described.repeat = _BY_A_PROGRAM
     if given.keys() <= {"replicas", "seed"}:
         words = [word for key, value in given.items() for word in (f"--{key}", str(value))]
@@ -223,7 +225,7 @@ def _study_of_file(source: Any, given: Mapping[str, Any], sets: Iterable[str]) -
     return described
 
 
-def _tables(given: Mapping[str, Any]) -> dict[str, Any]:
+def _keywords_as_tables(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return keywords as the tables of a study file."""
     tables: dict[str, Any] = {}
     for key, value in given.items():
@@ -234,7 +236,7 @@ def _tables(given: Mapping[str, Any]) -> dict[str, Any]:
     return tables
 
 
-def _base_of(
+def _split_changes(
     file: SceneFile, changes: Sequence[Change]
 ) -> tuple[SceneFile, list[tuple[str, str]], list[Change]]:
     """Return a scene's tables as read, and its changes as swaps and then values.
@@ -254,7 +256,7 @@ def _base_of(
     return changed, [], []
 
 
-def _workers(study: Study, workers: int | None) -> int:
+def _default_worker_count(study: Study, workers: int | None) -> int:
     if workers is not None and not (
         isinstance(workers, int) and not isinstance(workers, bool) and 1 <= workers <= _MOST_WORKERS
     ):
@@ -293,7 +295,7 @@ def _run_study(
     home = Path(mkdtemp(prefix="dsa_des-")) if out is None else None
     try:
         folder = StudyFolder(home / "study" if home is not None else Path(out or ""))
-        _run_into(folder, study, workers, resume, progress)
+        _run_into_folder(folder, study, workers, resume, progress)
         return StudyResult(study, folder, home)
     except BaseException:
         if home is not None:
@@ -301,7 +303,7 @@ def _run_study(
         raise
 
 
-def _run_into(
+def _run_into_folder(
     folder: StudyFolder,
     study: Study,
     workers: int,

@@ -14,7 +14,7 @@ from dsa_des.arrays.column_values import (
     Instants,
     Schema,
     Text,
-    in_seconds,
+    instants_to_seconds,
     is_empty,
     null_column,
 )
@@ -46,24 +46,24 @@ _TYPES = {
 
 def arrow_schema(schema: Schema) -> pa.Schema:
     """Return the Arrow schema of recorded columns; whole numbers and flags are never null."""
-    return pa.schema([_field(name, kind, _TYPES[kind]) for name, kind in schema.items()])
+    return pa.schema([_arrow_field(name, kind, _TYPES[kind]) for name, kind in schema.items()])
 
 
-def _field(name: str, kind: str, arrow_type: pa.DataType) -> pa.Field:
+def _arrow_field(name: str, kind: str, arrow_type: pa.DataType) -> pa.Field:
     # Where there can be no null, Parquet spares a level for each value: two thirds of the time.
     return pa.field(name, arrow_type, nullable=kind in ("float64", "text") and name not in _LEADING)
 
 
 def to_arrow(columns: Columns, schema: Schema) -> pa.RecordBatch:
     """Return recorded columns as a record batch; NaN and code -1 become null."""
-    arrays = [_array(columns[name], kind) for name, kind in schema.items()]
+    arrays = [_arrow_array(columns[name], kind) for name, kind in schema.items()]
     return pa.RecordBatch.from_arrays(arrays, schema=arrow_schema(schema))
 
 
-def _array(values: Any, kind: str) -> pa.Array:
+def _arrow_array(values: Any, kind: str) -> pa.Array:
     if isinstance(values, Text):
-        return _dictionary(values.codes, values.names).cast(pa.string())
-    values = in_seconds(values)
+        return _dictionary_array(values.codes, values.names).cast(pa.string())
+    values = instants_to_seconds(values)
     if kind == "float64":
         if is_empty(values):
             return pa.nulls(len(values), _TYPES[kind])
@@ -88,7 +88,7 @@ def _array_of_buffer(values: AnyArray, missing: AnyArray | None = None) -> pa.Ar
     return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), buffers)
 
 
-def _dictionary(codes: AnyArray, names: tuple[str, ...]) -> pa.DictionaryArray:
+def _dictionary_array(codes: AnyArray, names: tuple[str, ...]) -> pa.DictionaryArray:
     missing = codes < 0
     indices = _array_of_buffer(codes, missing if missing.any() else None)
     encoded = [name.encode() for name in names]
@@ -108,10 +108,10 @@ def _encode_by_appearance(text: Text) -> pa.DictionaryArray:
     used = used[np.argsort(first[used])]
     names = tuple(text.names[i] for i in used.tolist())
     if np.array_equal(used, np.arange(len(used))):
-        return _dictionary(text.codes, names)
+        return _dictionary_array(text.codes, names)
     code_of = np.full(len(text.names) + 1, -1, dtype=np.int32)  # the last entry is that of null
     code_of[used] = np.arange(len(used))
-    return _dictionary(code_of[text.codes], names)
+    return _dictionary_array(code_of[text.codes], names)
 
 
 def _first_rows(codes: AnyArray, names: int) -> IntArray:
@@ -194,7 +194,7 @@ class ParquetSink:
                 part = Text(values.codes[rows], values.names)
                 arrays.append(_encode_by_appearance(part))
             else:
-                arrays.append(_array(values[rows], kind))
+                arrays.append(_arrow_array(values[rows], kind))
         return pa.Table.from_arrays(arrays, schema=_writer_schema(self._schemas[table]))
 
     def close(self) -> None:
@@ -217,7 +217,9 @@ class ParquetSink:
 def _writer_schema(schema: Schema) -> pa.Schema:
     """Return the schema as the writer is given it: text as codes, which files hold as text."""
     text = pa.dictionary(pa.int32(), pa.string())
-    return pa.schema([_field(n, k, text if k == "text" else _TYPES[k]) for n, k in schema.items()])
+    return pa.schema(
+        [_arrow_field(n, k, text if k == "text" else _TYPES[k]) for n, k in schema.items()]
+    )
 
 
 def _concatenate(parts: list[Any]) -> Any:
@@ -230,5 +232,5 @@ def _concatenate(parts: list[Any]) -> Any:
         return Text(np.concatenate([part.codes for part in parts]), parts[-1].names)
     if all(isinstance(part, Instants) for part in parts):
         return Instants(np.concatenate([p.ticks for p in parts]), parts[0].ticks_per_s)
-    parts = [in_seconds(part) for part in parts]
+    parts = [instants_to_seconds(part) for part in parts]
     return np.concatenate(parts)

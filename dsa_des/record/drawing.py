@@ -47,10 +47,10 @@ class PictureFile:
         OSError
             If it cannot be written.
         """
-        _save(self.name, self.png, path)
+        _save_picture(self.name, self.png, path)
 
 
-def _save(
+def _save_picture(
     name: str,
     png: bytes,
     path: str | os.PathLike[str],
@@ -82,7 +82,7 @@ def _figure_class() -> Any:
 
         def save(self, path: str | os.PathLike[str]) -> None:
             """Write the figure in the format that the name asks for; see `PictureFile.save`."""
-            _save(self.name, self.png, path, self._as)
+            _save_picture(self.name, self.png, path, self._as)
 
         def _as(self, kind: str) -> bytes:
             content = io.BytesIO()
@@ -122,7 +122,7 @@ _MOST_LINES = 60
 
 
 @contextmanager
-def drawing(
+def draw_to_png(
     width_in: float, height_in: float, path: Path | BinaryIO, dpi: int = DPI
 ) -> Iterator[Any]:
     """Give an empty figure and write it as PNG, to a file or a stream, when the block is done.

@@ -10,17 +10,17 @@ from dsa_des.arrays.column_values import (
     Instants,
     Schema,
     Text,
-    constant,
+    constant_column,
+    holds_only,
     is_constant,
     is_empty,
     null_column,
-    repeats,
 )
 from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import Message, rows_of
 from dsa_des.block.recorded_columns import LEADING, PLATFORM
-from dsa_des.errors import nearest
+from dsa_des.errors import nearest_name
 from dsa_des.record.sinks import Sink
 from dsa_des.record.text_codes import TextCodes
 from dsa_des.time.runs import Runs
@@ -68,7 +68,7 @@ class DeclaredColumns:
 def _suggest_declared(name: str, declared: Iterable[str]) -> str:
     """Return the declared name nearest to one that is not, and what is declared."""
     names = sorted(declared)
-    close = nearest(name, names)
+    close = nearest_name(name, names)
     shown = ", ".join(names[:_MOST_NAMES]) + (", ..." if len(names) > _MOST_NAMES else "")
     asked = "" if close is None else f"; did you mean {close!r}?"
     return f"{asked} (declared: {shown or 'nothing'})"
@@ -269,7 +269,7 @@ class Recorder:
             ready: list[tuple[str, Columns]] = []
             later: list[tuple[str, Columns]] = []
             for block, columns in pieces:
-                instants = _instants(columns)
+                instants = _instants_of_columns(columns)
                 count = instants.count_before(run, tick)
                 if count == len(instants):
                     ready.append((block, columns))
@@ -289,7 +289,7 @@ class Recorder:
 
     def _flush_table(self, table: str, pieces: list[tuple[str, Columns]]) -> None:
         pieces.sort(key=lambda piece: piece[0])
-        instants = RunTicks.concatenate([_instants(columns) for _, columns in pieces])
+        instants = RunTicks.concatenate([_instants_of_columns(columns) for _, columns in pieces])
         order = instants.order()
         if self._ends is not None and self._ends.early:
             kept = self._ends.is_before_ends(instants)
@@ -333,7 +333,7 @@ class Recorder:
             ticks = _concatenate([values.ticks for values in given], order)
             return Instants(ticks, self._ticks_per_s)
         parts = [
-            _values(self._to_seconds(values), kind, len(columns["tick"]))
+            _column_values(self._to_seconds(values), kind, len(columns["tick"]))
             for values, (_, columns) in zip(given, pieces, strict=True)
         ]
         if all(map(is_empty, parts)):
@@ -352,23 +352,23 @@ _LEAST_ROWS = 16
 def _concatenate(parts: list[AnyArray], order: IntArray | None) -> AnyArray:
     """Return the values of all parts in order; where all are the same, as one of them."""
     first, rows = parts[0][:1], sum(map(len, parts))
-    if rows >= _LEAST_ROWS * len(parts) and all(repeats(part, first) for part in parts):
-        return constant(first[0], rows if order is None else len(order), first.dtype)
+    if rows >= _LEAST_ROWS * len(parts) and all(holds_only(part, first) for part in parts):
+        return constant_column(first[0], rows if order is None else len(order), first.dtype)
     values = np.concatenate(parts) if len(parts) > 1 else parts[0]
     return values if order is None else values.take(order)
 
 
-def _instants(columns: Columns) -> RunTicks:
+def _instants_of_columns(columns: Columns) -> RunTicks:
     tick: Any = columns["tick"]
     run: Any = columns.get("replica")
     return RunTicks(runs_of_single(len(tick)) if run is None else run, tick)
 
 
-def _values(values: Any, kind: str, count: int) -> AnyArray:
+def _column_values(values: Any, kind: str, count: int) -> AnyArray:
     if values is None:
-        return null_column(count) if kind == "float64" else constant(0, count, kind)
+        return null_column(count) if kind == "float64" else constant_column(0, count, kind)
     values = np.asarray(values)
     # Whole numbers may be narrower: sinks widen them where they must be wide.
     if values.dtype == kind or (kind == "int64" and values.dtype.kind == "i"):
         return values
-    return constant(values[0], count, kind) if is_constant(values) else values.astype(kind)
+    return constant_column(values[0], count, kind) if is_constant(values) else values.astype(kind)

@@ -18,7 +18,7 @@ from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.foreign import load_installed
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
-from dsa_des.files.output_folder import RUN_JSON, with_files
+from dsa_des.files.output_folder import RUN_JSON, add_file_list
 from dsa_des.files.output_names import new_folder_name
 from dsa_des.record.drawing import pictures_in
 from dsa_des.record.notes import OF_ROWS
@@ -50,7 +50,7 @@ def write_run_json(folder: Path, content: dict[str, Any]) -> None:
 
     A folder whose files are not listed is not replaced by later results.
     """
-    write_json(folder / RUN_JSON, with_files(folder, content))
+    write_json(folder / RUN_JSON, add_file_list(folder, content))
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,7 +86,7 @@ class Run:
             raise KeyError(f"the run has no table {table!r}; it has {', '.join(self.tables)}")
         joined: dict[str, Any] = self.__dict__.setdefault("_joined", {})
         if table not in joined:
-            joined[table] = with_columns_of_rows(self.tables, table)
+            joined[table] = join_row_columns(self.tables, table)
         return joined[table]
 
     def __getattr__(self, table: str) -> "pa.Table":
@@ -151,7 +151,7 @@ class Run:
         return self.figures[name]
 
 
-def with_columns_of_rows(tables: "Mapping[str, pa.Table]", name: str) -> "pa.Table":
+def join_row_columns(tables: "Mapping[str, pa.Table]", name: str) -> "pa.Table":
     """Return a table with the columns of other tables that belong to its rows (`OF_ROWS`).
 
     They are joined by block, tick and replica; where the table has such a column itself, what
@@ -165,7 +165,7 @@ def with_columns_of_rows(tables: "Mapping[str, pa.Table]", name: str) -> "pa.Tab
         wanted = [f for f in other.schema if (f.metadata or {}).get(OF_ROWS) == name.encode()]
         if not wanted or not {*table.column_names} & {*other.column_names} >= _KEYS:
             continue
-        row = _rows_of(table, other)
+        row = _matching_rows(table, other)
         rows = pa.array(row, mask=row < 0)
         for item in wanted:
             values = other[item.name].take(rows)
@@ -178,7 +178,7 @@ def with_columns_of_rows(tables: "Mapping[str, pa.Table]", name: str) -> "pa.Tab
     return table
 
 
-def _rows_of(table: "pa.Table", other: "pa.Table") -> IntArray:
+def _matching_rows(table: "pa.Table", other: "pa.Table") -> IntArray:
     """Return the row of another table with the block, tick and replica of each row; -1 for none."""
     import numpy as np
     import pyarrow as pa

@@ -11,12 +11,12 @@ from dsa_des.arrays.column_values import (
     Schema,
     Text,
     has_same_bits,
-    in_seconds,
+    instants_to_seconds,
 )
 from dsa_des.arrays.types import AnyArray
 
 
-def attempt(
+def call_or_note(
     what: str,
     notes: list[str],
     call: Callable[..., Any],
@@ -29,11 +29,11 @@ def attempt(
     except unless:
         raise
     except Exception as error:  # MemoryError is one of them
-        notes.append(f"{what} failed: {_reason(error)}")
+        notes.append(f"{what} failed: {_error_reason(error)}")
         return None
 
 
-def _reason(error: Exception) -> str:
+def _error_reason(error: Exception) -> str:
     text = str(error).strip().split("\n")[0]
     if isinstance(error, MemoryError):
         return f"out of memory{': ' if text else ''}{text}"
@@ -115,17 +115,17 @@ class ColumnSink(_Keeping):
     def _concatenate(self, table: str, parts: list[Columns]) -> Columns:
         joined: Columns = {}
         for name, kind in self._schemas[table].items():
-            pieces: list[Any] = [in_seconds(part[name]) for part in parts]
+            pieces: list[Any] = [instants_to_seconds(part[name]) for part in parts]
             if kind == "text":  # later pieces know at least the names of earlier ones
                 codes = [piece.codes for piece in pieces]
                 names = pieces[-1].names if pieces else ()
-                joined[name] = Text(_dense(codes, np.int32), names)
+                joined[name] = Text(_join_column(codes, np.int32), names)
             else:
-                joined[name] = _dense(pieces, np.dtype(kind))
+                joined[name] = _join_column(pieces, np.dtype(kind))
         return joined
 
 
-def _dense(pieces: list[AnyArray], kind: Any) -> AnyArray:
+def _join_column(pieces: list[AnyArray], kind: Any) -> AnyArray:
     if len(pieces) == 1:
         return pieces[0].astype(kind, copy=False)
     return np.concatenate(pieces, dtype=kind) if pieces else np.empty(0, dtype=kind)
@@ -161,11 +161,11 @@ class Observer(Protocol):
         """Return sections of the run's summary."""
 
 
-def _plain(values: Any) -> Any:
+def _observer_column(values: Any) -> Any:
     """Return a column as observers read it: instants in seconds, whole numbers of 64 bits."""
     if isinstance(values, Text):
         return values
-    values = in_seconds(values)
+    values = instants_to_seconds(values)
     return values.astype(np.int64, copy=False) if values.dtype.kind == "i" else values
 
 
@@ -187,7 +187,7 @@ class ObserverSink:
         """Pass rows to every observer of this table."""
         asked = [observer for observer in self.observers if table in observer.tables]
         if asked:
-            columns = {name: _plain(values) for name, values in columns.items()}
+            columns = {name: _observer_column(values) for name, values in columns.items()}
         for observer in asked:
             self._ask(observer, observer.update, table, columns)
 
@@ -205,7 +205,9 @@ class ObserverSink:
         if self._notes is None:
             return call(*arguments)
         count = len(self._notes)
-        answer = attempt(f"the summary {type(observer).__name__}", self._notes, call, *arguments)
+        answer = call_or_note(
+            f"the summary {type(observer).__name__}", self._notes, call, *arguments
+        )
         if len(self._notes) > count:
             self.observers.remove(observer)
         return answer

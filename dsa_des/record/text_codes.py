@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dsa_des.arrays.column_values import Columns, Text, constant
+from dsa_des.arrays.column_values import Columns, Text, constant_column
 from dsa_des.arrays.types import AnyArray
 
 
@@ -25,10 +25,10 @@ class TextCodes:
         if self._of_block is not None:
             name = self._of_block(block)
             code = -1 if name is None else self._codes_of((name,))[0]
-            return constant(code, count, "int32")
+            return constant_column(code, count, "int32")
         text = columns.get(self._column)
         if text is None:
-            return constant(-1, count, "int32")
+            return constant_column(-1, count, "int32")
         if not isinstance(text, Text):
             raise TypeError(f"column {self._column!r} must be Text")
         return self._codes_of(text.names).take(text.codes, mode="wrap")  # -1 takes the last entry

@@ -14,13 +14,13 @@ from pydantic import BaseModel, ValidationError
 
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.block_table import Block, BlockOptions
-from dsa_des.scene.changes import Stretch, ticks_of_all
+from dsa_des.scene.changes import Stretch, common_ticks_per_s
 from dsa_des.scene.checks import check_times, read_clocks
-from dsa_des.scene.keys import explain_no_item, place_of, unquote_key
-from dsa_des.scene.parameter_errors import explain
+from dsa_des.scene.keys import explain_no_item, item_index, unquote_key
+from dsa_des.scene.parameter_errors import explain_validation_error
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
-from dsa_des.scene.wiring import with_latencies
+from dsa_des.scene.wiring import add_block_latencies
 from dsa_des.time.clock import parse_rational
 
 
@@ -36,7 +36,7 @@ class Replica:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
 
-def scene_of(scene: Scene, replica: Replica) -> Scene:
+def replica_scene(scene: Scene, replica: Replica) -> Scene:
     """Return the scene of one replica.
 
     A `SceneError` says which change names nothing in the scene, or is not allowed.
@@ -50,7 +50,7 @@ def scene_of(scene: Scene, replica: Replica) -> Scene:
         blocks, sections, duration = _change_one_by_one(scene, replica.changes, paths)
     wires = scene.wires
     if any(blocks[name].options is not block.options for name, block in scene.blocks.items()):
-        wires = with_latencies(wires, {name: block.options for name, block in blocks.items()})
+        wires = add_block_latencies(wires, {name: block.options for name, block in blocks.items()})
     ticks_per_s = scene.ticks_per_s
     if wires is not scene.wires or duration is not scene.duration_s or _times_differ(scene, blocks):
         file = SceneFile(scene.path, {})
@@ -65,16 +65,16 @@ def scene_of(scene: Scene, replica: Replica) -> Scene:
         wires=wires,
         duration_s=duration,
         ticks_per_s=ticks_per_s,
-        stretches=[_stretch_of(stretch, replica) for stretch in scene.stretches],
+        stretches=[_replica_stretch(stretch, replica) for stretch in scene.stretches],
     )
     if made.stretches:
         file = SceneFile(scene.path, {})
-        made.ticks_per_s = ticks_of_all(file, made)
+        made.ticks_per_s = common_ticks_per_s(file, made)
         file.refuse()
     return made
 
 
-def _stretch_of(stretch: Stretch, replica: Replica) -> Stretch:
+def _replica_stretch(stretch: Stretch, replica: Replica) -> Stretch:
     """Return a stretch as a replica has it: what the scene changes then, the replica does not."""
     fixed = [key_path(key) for key in stretch.keys]
     mine = {
@@ -82,7 +82,7 @@ def _stretch_of(stretch: Stretch, replica: Replica) -> Stretch:
         for key, value in replica.changes.items()
         if not any(key_path(key)[: len(path)] == path for path in fixed)
     }
-    return replace(stretch, scene=scene_of(stretch.scene, Replica(replica.seed, mine)))
+    return replace(stretch, scene=replica_scene(stretch.scene, Replica(replica.seed, mine)))
 
 
 _Changed = tuple[dict[str, Block], dict[str, Any], Fraction | None]
@@ -143,13 +143,13 @@ def _change_one_by_one(
                 known = [f"blocks.{name}" for name in blocks] + [*sections, "duration_s"]
                 hint = did_you_mean(".".join(map(str, path[:2])), known)
                 why = _THE_SAME.get(str(path[0]), f"is no key of this scene{hint}")
-                problems.append(_problem(scene, key, why, value))
+                problems.append(_change_problem(scene, key, why, value))
         except ValidationError as error:
             file = SceneFile(scene.path, {})
-            for problem in explain(file, (), key, BlockOptions, error):
-                problems.append(_problem(scene, key, problem.message, value))
+            for problem in explain_validation_error(file, (), key, BlockOptions, error):
+                problems.append(_change_problem(scene, key, problem.message, value))
         except (ValueError, LookupError, TypeError) as error:
-            problems.append(_problem(scene, key, str(error), value))
+            problems.append(_change_problem(scene, key, str(error), value))
     if problems:
         raise SceneError(problems) from None
     return blocks, sections, duration
@@ -181,7 +181,7 @@ def key_path(key: str) -> tuple[str | int, ...]:
     )
 
 
-def _problem(scene: Scene, key: str, message: str, value: Any) -> Problem:
+def _change_problem(scene: Scene, key: str, message: str, value: Any) -> Problem:
     return Problem(
         str(scene.path), key, message, float(value) if isinstance(value, Fraction) else value
     )
@@ -209,7 +209,7 @@ def _replace_value(old: Any, path: tuple[str | int, ...], value: Any) -> Any:
         return model.model_validate(given)
     if isinstance(old, list | tuple):
         items = list(old)
-        index, rest = item_of(items, path)
+        index, rest = find_item(items, path)
         items[index] = _replace_value(items[index], rest, value)
         return items
     if isinstance(old, dict):
@@ -228,7 +228,7 @@ def _replace_values(old: Any, changes: Mapping[tuple[str | int, ...], Any]) -> A
     for path, value in changes.items():
         first, rest = path[0], path[1:]
         if isinstance(old, list | tuple):
-            first, rest = item_of(list(old), path)
+            first, rest = find_item(list(old), path)
         parts.setdefault(first, {})[rest] = value
     if isinstance(old, BaseModel):
         model = type(old)
@@ -248,13 +248,13 @@ def _replace_values(old: Any, changes: Mapping[tuple[str | int, ...], Any]) -> A
     raise ValueError
 
 
-def item_of(items: list[Any], path: tuple[str | int, ...]) -> tuple[int, tuple[str | int, ...]]:
+def find_item(items: list[Any], path: tuple[str | int, ...]) -> tuple[int, tuple[str | int, ...]]:
     """Return which item the head of a path means, by number or name, and the tail of the path.
 
     Names may hold the dots at which the path was split.
     """
     for length in range(len(path), 0, -1):
-        index = place_of(items, ".".join(map(str, path[:length])))
+        index = item_index(items, ".".join(map(str, path[:length])))
         if index is not None:
             return index, path[length:]
     raise ValueError(explain_no_item(items, str(path[0])))

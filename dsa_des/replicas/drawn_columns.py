@@ -23,7 +23,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, PlainSerializer
 
 from dsa_des.block.component import ClockedParameters, Component, Parameters
 from dsa_des.errors import SceneError
-from dsa_des.replicas.changed_scene import Replica, item_of, key_path, scene_of
+from dsa_des.replicas.changed_scene import Replica, find_item, key_path, replica_scene
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import NANOSECONDS, parse_rational
@@ -107,7 +107,7 @@ def _replace_values(old: Any, changes: Mapping[Path, Any]) -> Any:
     fields = {name: old.__dict__[name] for name in _fields_of(type(old))}
     for name, mine in parts.items():
         fields[name] = mine[()] if () in mine else _replace_values(fields[name], mine)
-    return _model_of(type(old), fields, set(old.model_fields_set))
+    return _make_model(type(old), fields, set(old.model_fields_set))
 
 
 @lru_cache(maxsize=256)
@@ -115,7 +115,7 @@ def _fields_of(model: type[BaseModel]) -> tuple[str, ...]:
     return tuple(model.model_fields)
 
 
-def _model_of(model: type[BaseModel], fields: dict[str, Any], given: set[str]) -> BaseModel:
+def _make_model(model: type[BaseModel], fields: dict[str, Any], given: set[str]) -> BaseModel:
     new = model.__new__(model)
     object.__setattr__(new, "__dict__", fields)
     object.__setattr__(new, "__pydantic_fields_set__", given)
@@ -127,7 +127,8 @@ def _model_of(model: type[BaseModel], fields: dict[str, Any], given: set[str]) -
 def drawn_columns(scene: Scene, replicas: Sequence[Replica]) -> ReplicaScenes | None:
     """Return the scenes of replicas, checked as columns; None where that cannot be done.
 
-    Then every one has to be made and checked by itself (`scene_of`), which also says what is wrong.
+    Then every one has to be made and checked by itself (`replica_scene`), which also says what is
+    wrong.
     """
     if len(replicas) < _FEWEST or scene.stretches:
         return None
@@ -135,25 +136,27 @@ def drawn_columns(scene: Scene, replicas: Sequence[Replica]) -> ReplicaScenes | 
     if any(replica.changes.keys() != keys for replica in replicas):
         return None
     try:
-        columns = {key: _column(scene, key, [r.changes[key] for r in replicas]) for key in keys}
+        columns = {
+            key: _checked_column(scene, key, [r.changes[key] for r in replicas]) for key in keys
+        }
         seeds = [replica.seed for replica in replicas]
         probes = [{key: pick(c.values) for key, c in columns.items()} for pick in _PROBES]
-        made = [scene_of(scene, Replica(seeds[0], probe)) for probe in probes]
+        made = [replica_scene(scene, Replica(seeds[0], probe)) for probe in probes]
         return ReplicaScenes(made[0], seeds, _watch_columns(made[0], list(columns.values())))
     except (_NoColumn, SceneError):
         return None
 
 
-def scenes_of(scene: Scene, replicas: Sequence[Replica]) -> Sequence[Scene]:
+def replica_scenes(scene: Scene, replicas: Sequence[Replica]) -> Sequence[Scene]:
     """Return the scene of every replica.
 
     Raises
     ------
     SceneError
-        As `scene_of`, for the first replica with something wrong.
+        As `replica_scene`, for the first replica with something wrong.
     """
     together = drawn_columns(scene, replicas)
-    return [scene_of(scene, replica) for replica in replicas] if together is None else together
+    return [replica_scene(scene, replica) for replica in replicas] if together is None else together
 
 
 #: Which replicas stand for all: those with the lowest and highest values, and those closest to 0.
@@ -166,7 +169,7 @@ class _NoColumn(Exception):
     """These values cannot be checked as columns."""
 
 
-def _column(scene: Scene, key: str, values: Sequence[Any]) -> DrawnColumn:
+def _checked_column(scene: Scene, key: str, values: Sequence[Any]) -> DrawnColumn:
     """Return the column of a key, its values as its field would hold them."""
     path = key_path(key)
     if len(path) < 3 or path[0] != "blocks" or path[1] not in scene.blocks:
@@ -174,11 +177,11 @@ def _column(scene: Scene, key: str, values: Sequence[Any]) -> DrawnColumn:
     block = scene.blocks[str(path[1])]
     if path[2] in BlockOptions.model_fields and path[2] not in type(block.parameters).model_fields:
         raise _NoColumn
-    found, model, name = _place(block.parameters, path[2:])
+    found, model, name = _locate_field(block.parameters, path[2:])
     return DrawnColumn(block.name, found, _validate_values(model, name, values))
 
 
-def _place(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
+def _locate_field(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
     """Return a path with items by number, and the field at its end."""
     found: list[str | int] = []
     old: Any = parameters
@@ -193,7 +196,7 @@ def _place(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
                 return tuple(found), model, name
         elif type(old) in (list, tuple):
             try:
-                index, path = item_of(old, path)
+                index, path = find_item(old, path)
             except ValueError:
                 raise _NoColumn from None
             found.append(index)
@@ -278,7 +281,7 @@ def _watch_columns(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[Dra
         mine = [column for column in columns if column.block == name]
         block = scene.blocks[name]
         try:
-            with _reading() as read:
+            with _track_reads() as read:
                 parameters = _validate_watched(block.parameters, [column.path for column in mine])
                 if read:
                     raise _NoColumn
@@ -291,13 +294,13 @@ def _watch_columns(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[Dra
                 "clock_of" in _declared_names(block.cls, Component)
                 or "clock_spec" in _declared_names(type(block.parameters), ClockedParameters)
                 or column.path == ("scan_rate_hz",)
-                or any(NANOSECONDS % value.denominator for value in _offsets(column))
+                or any(NANOSECONDS % value.denominator for value in _clock_offsets(column))
             ):
                 raise _NoColumn
     return columns
 
 
-def _offsets(column: DrawnColumn) -> Sequence[Fraction]:
+def _clock_offsets(column: DrawnColumn) -> Sequence[Fraction]:
     return column.values if column.path == ("offset_s",) else ()
 
 
@@ -327,7 +330,7 @@ _ALL_FIELDS = frozenset(dir(BaseModel)) - _HARMLESS - {"model_fields", "model_fi
 
 
 @contextmanager
-def _reading() -> Iterator[set[str]]:
+def _track_reads() -> Iterator[set[str]]:
     """Give the names that are read meanwhile of what `_watched_type` makes."""
     _noted.append(set())
     try:

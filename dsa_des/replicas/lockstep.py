@@ -21,7 +21,7 @@ from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.running.effects import build_effects
 from dsa_des.running.grain import Grain
-from dsa_des.running.loops import opened_loops
+from dsa_des.running.loops import edges_opening_loops
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Rewinder, Windows
@@ -31,7 +31,7 @@ from dsa_des.stretches.stretched_block import StretchedBlock
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
 
-__all__ = ["NotInLockStep", "Replicas", "lock_step"]
+__all__ = ["NotInLockStep", "Replicas", "make_lockstep_simulation"]
 
 # Side by side, windows that hold fewer rows than this of each replica cost more than runs apart.
 _MOST_WINDOWS_PER_SCAN = 10.0
@@ -42,7 +42,7 @@ _OF_THE_CLOCK = frozenset({"offset_s", "rate_error_ppm", "jitter_s"})
 TakeReport = Callable[[int, dict[str, Any]], None]
 
 
-def lock_step(
+def make_lockstep_simulation(
     scenes: Sequence[Scene],
     *,
     recorder: Recorder | None = None,
@@ -62,7 +62,7 @@ def lock_step(
 
 
 class Replicas(Timeline):
-    """Runs of a scene that share blocks; as for `lock_step`."""
+    """Runs of a scene that share blocks; as for `make_lockstep_simulation`."""
 
     says_replica = True
 
@@ -261,7 +261,7 @@ class Replicas(Timeline):
 
     def grain(self, window: int | None) -> Grain:
         """Return the grain: all run in windows, in loops in those that nothing comes back in."""
-        return Grain(set(self.scene.blocks), False, opened_loops(self.scene), {})
+        return Grain(set(self.scene.blocks), False, edges_opening_loops(self.scene), {})
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
         """Let instances report; a shared block has seen the rows of all and speaks for none."""

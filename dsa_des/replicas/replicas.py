@@ -12,10 +12,10 @@ from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.failure_counts import FailureCounts, FailuresByRun, add_counts, sum_runs
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.drawn_columns import drawn_columns, scenes_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
+from dsa_des.replicas.drawn_columns import drawn_columns, replica_scenes
 from dsa_des.replicas.lock_step_size import RunSize, are_few
-from dsa_des.replicas.lockstep import NotInLockStep, Replicas, lock_step
+from dsa_des.replicas.lockstep import NotInLockStep, Replicas, make_lockstep_simulation
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 
@@ -94,7 +94,7 @@ def _check_replicas(
     scenes: list[Scene] = []
     for replica in replicas:
         try:
-            scenes.append(scene_of(scene, replica))
+            scenes.append(replica_scene(scene, replica))
             failed.append(None)
         except SceneError as error:
             failed.append(Failed(str(error)))
@@ -113,7 +113,7 @@ def _split(scenes: Sequence[Scene], wanted: Wanted, most: int | None) -> Iterato
 def lock_step_refusal(scene: Scene, replicas: Sequence[Replica]) -> str | None:
     """Return why replicas cannot run in lock step, as far as it shows before they run."""
     try:
-        together = Replicas(scenes_of(scene, replicas))
+        together = Replicas(replica_scenes(scene, replicas))
         Simulation(together.scene, timeline=together)
         together.rehearse()
     except NotInLockStep as reason:
@@ -130,7 +130,7 @@ def _run_together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Re
     sink = ColumnSink()
     recorder = Recorder([sink], wanted=wanted, runs=runs)
     try:
-        simulation = lock_step(scenes, recorder=recorder)
+        simulation = make_lockstep_simulation(scenes, recorder=recorder)
         outcome = simulation.run()
     except (NotInLockStep, SceneError, BlockFailure):
         return None
@@ -147,7 +147,7 @@ def _run_together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Re
             tables,
             simulation.ticks_per_s,
             duration_s,
-            partial(_report, scenes, n),
+            partial(_report_unit, scenes, n),
             n in ended,
             shared,
             n,
@@ -167,7 +167,7 @@ def _split_by_replica(tables: dict[str, Columns], count: int) -> list[dict[str, 
     return parts
 
 
-def _report(scenes: Sequence[Scene], number: int) -> dict[str, Any]:
+def _report_unit(scenes: Sequence[Scene], number: int) -> dict[str, Any]:
     return Simulation(scenes[number]).run().report
 
 

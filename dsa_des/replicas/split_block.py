@@ -57,7 +57,7 @@ class SplitBlock:
             if number not in self._instances:
                 self._instances[number] = self.make(number)
                 self._made.add(number)
-            part = _part(wake, slice(first, end), number)
+            part = _rows_of_replica(wake, slice(first, end), number)
             for port, waiting in self._waiting.pop(number, {}).items():
                 part._arrived = {
                     **part._arrived,
@@ -75,7 +75,7 @@ class SplitBlock:
             for new in arrivals:
                 of = new.message.run
                 for number in np.unique(of[~np.isin(of, wake.run)]).tolist():
-                    part = _arrivals(new, number)
+                    part = _arrivals_of_replica(new, number)
                     held = self._waiting.setdefault(number, {}).setdefault(port, [])
                     held[:] = _append_arrivals(held, [part] if part else [])
 
@@ -94,7 +94,7 @@ class SplitBlock:
                 self._finished(number, self._instances.pop(number))
 
 
-def _part(wake: Wake, rows: slice, number: int) -> Wake:
+def _rows_of_replica(wake: Wake, rows: slice, number: int) -> Wake:
     """Return the rows of one replica as its own run would see them."""
     held = {}
     for port, (message, row_at) in wake._held.items():
@@ -106,7 +106,7 @@ def _part(wake: Wake, rows: slice, number: int) -> Wake:
         part = _message_of_one_run(message.take(slice(low, int(there.max()) + 1)))
         held[port] = part, np.where(mine < 0, -1, mine - low)
     arrived = {
-        port: [came for new in arrivals if (came := _arrivals(new, number))]
+        port: [came for new in arrivals if (came := _arrivals_of_replica(new, number))]
         for port, arrivals in wake._arrived.items()
     }
 
@@ -122,7 +122,7 @@ def _part(wake: Wake, rows: slice, number: int) -> Wake:
     return Wake(instants, scans, wake.ticks_per_s, held, arrived, demand, clock=before, idle=idle)
 
 
-def _arrivals(new: Arrivals, number: int) -> Arrivals | None:
+def _arrivals_of_replica(new: Arrivals, number: int) -> Arrivals | None:
     first, end = np.searchsorted(new.message.run, [number, number + 1]).tolist()
     if first == end:
         return None

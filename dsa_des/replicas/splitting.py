@@ -31,7 +31,7 @@ import numpy as np
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.time.clock import NANOSECONDS
-from dsa_des.time.randomness import branch, key_of
+from dsa_des.time.randomness import branch_seed, key_of
 
 #: A level of the pilot is reached by at least so many of its runs, where one is.
 _SHARE = 0.2
@@ -99,7 +99,9 @@ class _Repetition:
         parents = some[choose_parents(self.weights[some], count, uniform)]
         self.runs = [
             Replica(
-                branch(self.runs[k].seed, instant_ns(reached_s[k]), self._seed_of(number)),
+                branch_seed(
+                    self.runs[k].seed, branch_instant_ns(reached_s[k]), self._seed_of(number)
+                ),
                 self.runs[k].changes,
             )
             for number, k in enumerate(parents.tolist())
@@ -121,7 +123,7 @@ def choose_parents(weights: FloatArray, count: int, uniform: float) -> IntArray:
     return np.minimum(np.searchsorted(ends, places, side="right"), len(weights) - 1)
 
 
-def instant_ns(reached_s: float) -> int:
+def branch_instant_ns(reached_s: float) -> int:
     """Return from when on a run that came within a level draws anew, ns since its start."""
     return math.ceil(reached_s * NANOSECONDS) + _SURELY_NS
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.drawn_columns import scenes_of
+from dsa_des.replicas.drawn_columns import replica_scenes
 from dsa_des.scene.changes import TimedChange
 from dsa_des.scene.scene import Scene
 from dsa_des.stretches.outages import Outages, merge_spans
@@ -23,13 +23,13 @@ TimesOut = Mapping[str, list[FloatArray]]
 _ENABLED = "enabled"
 
 
-def blocks_that_may_be_out(scene: Scene) -> list[str]:
+def blocks_with_outages(scene: Scene) -> list[str]:
     """Return the blocks that fail at random or that changes switch on or off, sorted."""
     names = {name for one in scene.outages for name in one.blocks}
     return sorted(names.union(*(map(_switched_blocks, scene.changes))))
 
 
-def times_out_s(scene: Scene, seeds: Sequence[int], ends_s: FloatArray) -> TimesOut:
+def outage_times_of_seeds(scene: Scene, seeds: Sequence[int], ends_s: FloatArray) -> TimesOut:
     """Return when blocks that may be out are, in each run.
 
     Runs differ in seeds and in when they end.
@@ -41,7 +41,7 @@ def times_out_s(scene: Scene, seeds: Sequence[int], ends_s: FloatArray) -> Times
     starts = [0, *(int(stretch.from_s * per_s) for stretch in scene.stretches), runs.run_ticks]
     scenes = [scene, *(stretch.scene for stretch in scene.stretches)]
     result: dict[str, list[FloatArray]] = {}
-    for name in blocks_that_may_be_out(scene):
+    for name in blocks_with_outages(scene):
         failing = [one for one in scene.outages if name in one.blocks]
         drawn = Outages(failing, Streams(seeds), runs, per_s) if failing else None
         off = np.array(
@@ -59,16 +59,20 @@ def times_out_s(scene: Scene, seeds: Sequence[int], ends_s: FloatArray) -> Times
     return result
 
 
-def times_out(scene: Scene, replicas: Sequence[Replica], ends_s: FloatArray) -> TimesOut:
+def outage_times_of_replicas(
+    scene: Scene, replicas: Sequence[Replica], ends_s: FloatArray
+) -> TimesOut:
     """Return when blocks that may be out are, in each of some replicas of a scene."""
     seeds = [replica.seed for replica in replicas]
     if not any(key.endswith(".enabled") for one in replicas for key in one.changes):
-        return times_out_s(scene, seeds, ends_s)
+        return outage_times_of_seeds(scene, seeds, ends_s)
     each = [
-        times_out_s(one, [seed], ends_s[[number]])
-        for number, (one, seed) in enumerate(zip(scenes_of(scene, replicas), seeds, strict=True))
+        outage_times_of_seeds(one, [seed], ends_s[[number]])
+        for number, (one, seed) in enumerate(
+            zip(replica_scenes(scene, replicas), seeds, strict=True)
+        )
     ]
-    return {name: [one[name][0] for one in each] for name in blocks_that_may_be_out(scene)}
+    return {name: [one[name][0] for one in each] for name in blocks_with_outages(scene)}
 
 
 def _switched_blocks(change: TimedChange) -> set[str]:

@@ -10,8 +10,14 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import BLUE, PALETTE
-from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts
-from dsa_des.results.labels import axis_label, format_with_interval, readable, unit_of, value_label
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts
+from dsa_des.results.labels import (
+    axis_label,
+    format_with_interval,
+    readable_label,
+    unit_of,
+    value_label,
+)
 from dsa_des.results.maps import Target
 from dsa_des.results.statistics import chi_square_bounds
 from dsa_des.results.summary import Compared, Line
@@ -28,7 +34,7 @@ _WIDE_IN, _APART_PT = 9.0, 5.0
 _FEWEST_BINS, _MOST_BINS = 5, 40
 
 
-def _style(mark: tuple[str, str] | None, number: int, of: int) -> tuple[str, str]:
+def _series_style(mark: tuple[str, str] | None, number: int, of: int) -> tuple[str, str]:
     """Return colour and marker of a series: a lone one has those of the block it is of."""
     return mark if of == 1 and mark is not None else STYLES[number % len(STYLES)]
 
@@ -54,17 +60,17 @@ def draw_axis(
     """Draw a result against an axis, with intervals; below it the paired differences, if any."""
     index = axes.index(axis)
     values = list(dict.fromkeys(line.at[index] for line in lines))
-    where, numeric = _positions(values, category)
+    where, numeric = _tick_positions(values, category)
     series = list(_series_along(axes, lines, axis, by).items())
-    with drawing(_WIDE_IN, 6.4 if shown else 4.2, target) as figure:
+    with draw_to_png(_WIDE_IN, 6.4 if shown else 4.2, target) as figure:
         grid = figure.subplots(2 if shown else 1, 1, squeeze=False, sharex=True)[:, 0]
         top = grid[0]
         for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
-            colour, marker = _style(some[0].result.mark, number, len(series))
+            colour, marker = _series_style(some[0].result.mark, number, len(series))
             x = np.array([where[line.at[index]] for line in some])
             known = any(not np.isnan(line.estimate.half_width) for line in some)
             seen = series_label or "simulated" + f", {100 * confidence:g} % interval" * known
-            drawn = _points(top, x, some, colour, marker, seen, join=numeric)
+            drawn = _draw_points(top, x, some, colour, marker, seen, join=numeric)
             expected = [line.expected for line in some]
             if any(item is not None for item in expected):
                 y = [np.nan if item is None else item for item in expected]
@@ -74,26 +80,26 @@ def draw_axis(
                     x, y, color=colour, ls=":" if numeric else "", marker="_", ms=9, label=note,
                     zorder=1,
                 )  # fmt: skip
-            _dodge(top, drawn, number, len(series))
-        top.set_ylabel(readable(metric))
+            _shift_series(top, drawn, number, len(series))
+        top.set_ylabel(readable_label(metric))
         top.set_title(figure_text(title, _TITLE), loc="left")
         _put_legend_beside(top)
         if shown:
-            _differences(grid[1], shown, where, axes, axis, confidence)
+            _draw_differences(grid[1], shown, where, axes, axis, confidence)
         bottom = grid[-1]
         bottom.set_xlabel(axis_label(axis))
-        _ticks(bottom, values, where, numeric)
+        _set_ticks(bottom, values, where, numeric)
         fit_axes_to_texts(figure)
 
 
-def _positions(values: list[Any], category: bool) -> tuple[dict[Any, float], bool]:
+def _tick_positions(values: list[Any], category: bool) -> tuple[dict[Any, float], bool]:
     numeric = all(isinstance(v, int | float) for v in values)
     if numeric and not category:
         return {v: float(v) for v in values}, True
     return {v: float(k) for k, v in enumerate(values)}, False
 
 
-def _ticks(axes: Any, values: list[Any], where: dict[Any, float], numeric: bool) -> None:
+def _set_ticks(axes: Any, values: list[Any], where: dict[Any, float], numeric: bool) -> None:
     if not numeric:
         shown = values[:: -(-len(values) // _MOST_NAMES)]
         names = [f"{v:g}" if isinstance(v, float) else figure_text(v) for v in shown]
@@ -131,7 +137,7 @@ def _put_legend_beside(axes: Any) -> None:
         axes.legend(handles, names, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
 
 
-def _dodge(axes: Any, drawn: Sequence[Any], number: int, of: int) -> None:
+def _shift_series(axes: Any, drawn: Sequence[Any], number: int, of: int) -> None:
     """Shift a series sideways, so that the intervals of several series do not overlap."""
     from matplotlib.transforms import ScaledTranslation
 
@@ -143,7 +149,7 @@ def _dodge(axes: Any, drawn: Sequence[Any], number: int, of: int) -> None:
         artist.set_transform(moved)
 
 
-def _points(
+def _draw_points(
     axes: Any, x: Any, lines: list[Line], colour: str, marker: str, series_label: str, *, join: bool
 ) -> list[Any]:
     y = np.array([line.estimate.value for line in lines])
@@ -157,7 +163,7 @@ def _points(
     return list(drawn.get_children())
 
 
-def _differences(
+def _draw_differences(
     axes: Any,
     shown: Sequence[Compared],
     where: dict[Any, float],
@@ -173,14 +179,14 @@ def _differences(
         groups.setdefault(item.at, []).append(item)
     others = [name for name in names if name != axis]
     for number, (at, items) in enumerate(list(groups.items())[:_MOST_LINES]):
-        colour, marker = _style(shown[0].result.mark, number, len(groups))
+        colour, marker = _series_style(shown[0].result.mark, number, len(groups))
         x = np.array([where[item.value] for item in items])
         y = np.array([item.difference.paired.value for item in items])
         half = np.nan_to_num([item.difference.paired.half_width for item in items])
         series_label = ", ".join(value_label(n, v) for n, v in zip(others, at, strict=True))
         drawn = axes.errorbar(x, y, yerr=half, color=colour, marker=marker, ms=5, capsize=3, lw=1.2,
                       ls="none", label=series_label or None)  # fmt: skip
-        _dodge(axes, drawn.get_children(), number, len(groups))
+        _shift_series(axes, drawn.get_children(), number, len(groups))
         if len(groups) == 1:
             for px, item in zip(x, items, strict=True):
                 e = item.difference.paired
@@ -200,12 +206,12 @@ def draw_polar(
 ) -> None:  # fmt: skip
     """Draw a result over bearing: the axis is in degrees, clockwise from ahead (up)."""
     index = axes.index(axis)
-    with drawing(6.2, 6.0, target) as figure:
+    with draw_to_png(6.2, 6.0, target) as figure:
         polar = figure.add_subplot(projection="polar")
         polar.set(theta_zero_location="N", theta_direction=-1)
         series = list(_series_along(axes, lines, axis, None).items())
         for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
-            colour, marker = _style(some[0].result.mark, number, len(series))
+            colour, marker = _series_style(some[0].result.mark, number, len(series))
             some = sorted(some, key=lambda line: line.at[index])
             angle = np.radians([line.at[index] for line in some])
             low, value, high = (
@@ -220,7 +226,7 @@ def draw_polar(
             )
             polar.fill_between(angle[ring], low[ring], high[ring], color=colour, alpha=0.2, lw=0)
         polar.set_ylim(bottom=0.0)
-        over = f"{readable(metric)} over {axis_label(axis)[:1].lower()}{axis_label(axis)[1:]}"
+        over = f"{readable_label(metric)} over {axis_label(axis)[:1].lower()}{axis_label(axis)[1:]}"
         if any(np.isfinite(line.estimate.low) for line in lines):
             over += f"\nshaded: {100 * confidence:g} % interval"
         polar.set_title(f"{figure_text(title, _TITLE)}\n{over}", loc="left")
@@ -230,11 +236,11 @@ def draw_polar(
 
 
 @contextmanager
-def _chart(
+def _titled_axes(
     target: Target, title: str, width_in: float = _WIDE_IN, height_in: float = 4.2
 ) -> Iterator[Any]:
     """Give the axes of a figure, which has its title and its legend afterwards."""
-    with drawing(width_in, height_in, target) as figure:
+    with draw_to_png(width_in, height_in, target) as figure:
         axes = figure.add_subplot()
         yield axes
         axes.set_title(figure_text(title, _TITLE), loc="left")
@@ -255,10 +261,10 @@ def draw_histogram(
         for series_label, values in series[:_MOST_LINES]
     ]
     every = np.concatenate([values for _, values, _ in known] or [np.empty(0)])
-    with _chart(path, title) as axes:
-        edges = _edges(every, max((len(values) for _, values, _ in known), default=0))
+    with _titled_axes(path, title) as axes:
+        edges = _bin_edges(every, max((len(values) for _, values, _ in known), default=0))
         for number, (series_label, values, runs) in enumerate(known):
-            colour = _style(mark, number, len(known))[0]
+            colour = _series_style(mark, number, len(known))[0]
             counts = np.histogram(values, edges)[0]
             axes.stairs(
                 counts, edges, color=colour, lw=1.4, label=_count_label(series_label, values, runs)
@@ -266,7 +272,7 @@ def draw_histogram(
             axes.stairs(counts, edges, color=colour, fill=True, alpha=0.15)
         axes.set_ylim(bottom=0.0)
         axes.yaxis.get_major_locator().set_params(integer=True)
-        axes.set(xlabel=readable(metric), ylabel="Runs")
+        axes.set(xlabel=readable_label(metric), ylabel="Runs")
 
 
 def draw_cdf(
@@ -277,10 +283,10 @@ def draw_cdf(
     Runs without a value count as well: where some have none, a curve ends below 1.
     """
     shown = series[:_MOST_LINES]
-    with _chart(path, title) as axes:
+    with _titled_axes(path, title) as axes:
         for number, (series_label, values) in enumerate(shown):
             ascending = np.sort(values[~np.isnan(values)])
-            colour = _style(mark, number, len(shown))[0]
+            colour = _series_style(mark, number, len(shown))[0]
             if not len(ascending):
                 axes.plot([], [], color=colour, label=f"{series_label}: no value")
                 continue
@@ -293,7 +299,7 @@ def draw_cdf(
                 label=_count_label(series_label, ascending, len(values)),
             )  # fmt: skip
         axes.set_ylim(0.0, 1.02)
-        axes.set(xlabel=readable(metric), ylabel="Share of the runs at or below")
+        axes.set(xlabel=readable_label(metric), ylabel="Share of the runs at or below")
         axes.grid(color="#DDDDDD", linewidth=0.5)
 
 
@@ -302,7 +308,7 @@ def _count_label(series_label: str, values: FloatArray, runs: int) -> str:
     return f"{series_label}: {of} runs" if series_label else f"{of} runs"
 
 
-def _edges(values: FloatArray, most: int) -> FloatArray:
+def _bin_edges(values: FloatArray, most: int) -> FloatArray:
     """Return the edges of bins that all series share: about the square root of the runs of one."""
     if not len(values):
         return np.array([0.0, 1.0])
@@ -333,9 +339,9 @@ def draw_series(
     `limits` are one for all, or one for each number of the series.
     """
     name, _, along = metric.partition(".")
-    with _chart(path, title) as axes:
+    with _titled_axes(path, title) as axes:
         if freedom is not None and series:
-            _bounds(axes, series[0][1], series[0][2], freedom, confidence)
+            _draw_bounds(axes, series[0][1], series[0][2], freedom, confidence)
         for index, (series_label, x, lines) in enumerate(series[:_MOST_LINES]):
             colour, marker = STYLES[index % len(STYLES)]
             value, low, high = (
@@ -348,16 +354,16 @@ def draw_series(
             drawn = axes.plot(x, value, color=colour, marker=marker, ms=4, lw=1.2, label=label,
                               zorder=2)  # fmt: skip
             drawn.append(axes.vlines(x, low, high, color=colour, lw=1.0, zorder=2))
-            _dodge(axes, drawn, index, len(series))
+            _shift_series(axes, drawn, index, len(series))
         if limits and series:
             x = series[0][1]
             known = list(limits) if len(limits) == len(x) else [limits[0]] * len(x)
             axes.plot(x, known, color="#000000", ls="--", lw=1.2, label="limit", zorder=1)
         axes.set_ylim(bottom=0.0)
-        axes.set(xlabel=axis_label(along) if along else "", ylabel=readable(name))
+        axes.set(xlabel=axis_label(along) if along else "", ylabel=readable_label(name))
 
 
-def _bounds(
+def _draw_bounds(
     axes: Any, x: Sequence[float], lines: Sequence[Line], freedom: float, confidence: float
 ) -> None:
     # The mean of n variables, each with so many degrees, is one with n times as many, by n.
@@ -378,12 +384,12 @@ def draw_scatter(
 ) -> None:
     """Draw a result of two conditions against each other, one point per encounter or replica."""
     both = ~np.isnan(first) & ~np.isnan(second)
-    with _chart(path, title, 5.4, 5.2) as axes:
+    with _titled_axes(path, title, 5.4, 5.2) as axes:
         if both.any():
             held = np.concatenate([first[both], second[both]])
             ends = [held.min(), held.max()]
             axes.plot(ends, ends, color="#888888", lw=0.8)
         axes.plot(first[both], second[both], ls="none", marker="o", ms=4, color=BLUE,
                   alpha=0.6, markeredgewidth=0)  # fmt: skip
-        across, up = (f"{readable(metric)}: {figure_text(name)}" for name in names)
+        across, up = (f"{readable_label(metric)}: {figure_text(name)}" for name in names)
         axes.set(xlabel=across, ylabel=up)

@@ -13,15 +13,15 @@ from dsa_des.results.statistics import (
     FEW,
     Estimate,
     clip_estimate,
-    mean,
+    estimate_mean,
+    estimate_quantile,
     normal_error,
+    normal_estimate,
     normal_quantile,
-    quantile,
     scale_by_power_of_two,
     standard_error,
-    symmetric,
     t_quantile,
-    unseen_event,
+    unseen_event_moments,
 )
 
 _RESAMPLES = 1000
@@ -29,7 +29,7 @@ _RESAMPLES = 1000
 _ALIKE = 1e-9
 
 
-def changes_of(first: FloatArray, second: FloatArray) -> FloatArray:
+def subtract_without_rounding(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return second minus first; 0 where the two are alike but for how they were rounded.
 
     That is, within 1e-9 of the largest of them: a quantity is never known so well, and rounding
@@ -89,7 +89,7 @@ class EstimatedDifference:
         return self.unpaired.half_width / self.paired.half_width
 
 
-def difference(
+def estimate_difference(
     first: FloatArray,
     second: FloatArray,
     confidence: float,
@@ -109,17 +109,19 @@ def difference(
     """
     here, there = ~np.isnan(first), ~np.isnan(second)
     both = here & there
-    changes = changes_of(first[both], second[both])
+    changes = subtract_without_rounding(first[both], second[both])
     whole = kind == "share" and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
     counted = len(changes) > 1 and (kind == "event" or whole)
     paired = (
-        _estimate_by_counts(changes, confidence) if counted else mean(changes, confidence, method)
+        _estimate_by_counts(changes, confidence)
+        if counted
+        else estimate_mean(changes, confidence, method)
     )
     apart = counted and bool(np.isin((first[both], second[both]), (0.0, 1.0)).all())
     if apart:
         unpaired = _estimate_by_shares(first[both], second[both], confidence)
     else:
-        unpaired = _welch(first[both], changes, confidence)
+        unpaired = _welch_difference(first[both], changes, confidence)
     if kind != "number":
         paired, unpaired = _clip_to_shares(paired), _clip_to_shares(unpaired)
     return EstimatedDifference(
@@ -142,7 +144,7 @@ def quantile_difference(
     here, there = ~np.isnan(first), ~np.isnan(second)
     one, two = first[here & there], second[here & there]
     alone = int((here & ~there).sum()), int((there & ~here).sum())
-    ends = [quantile(values, share, confidence) for values in (one, two)]
+    ends = [estimate_quantile(values, share, confidence) for values in (one, two)]
     value = ends[1].value - ends[0].value
     if any(end.few for end in ends):
         none = Estimate(value, math.nan, math.nan, len(one), True)
@@ -156,8 +158,8 @@ def quantile_difference(
         drawn[k] = high - low
     apart = math.hypot(*(normal_error(end, confidence) for end in ends))
     return EstimatedDifference(
-        symmetric(value, float(drawn.std(ddof=1)), len(one), False, confidence),
-        symmetric(value, apart, len(one), False, confidence),
+        normal_estimate(value, float(drawn.std(ddof=1)), len(one), False, confidence),
+        normal_estimate(value, apart, len(one), False, confidence),
         *alone,
     )
 
@@ -195,11 +197,11 @@ def _estimate_by_shares(first: FloatArray, second: FloatArray, confidence: float
     return Estimate(value, middle - half, middle + half, count, count < FEW)
 
 
-def _welch(first: FloatArray, changes: FloatArray, confidence: float) -> Estimate:
+def _welch_difference(first: FloatArray, changes: FloatArray, confidence: float) -> Estimate:
     count = len(first)
     if count < 2:
         return Estimate(math.nan, math.nan, math.nan, count, True)
-    value = mean(changes, confidence).value
+    value = estimate_mean(changes, confidence).value
     errors, exponent = scale_by_power_of_two(
         np.array([standard_error(first), standard_error(first + changes)])
     )
@@ -238,8 +240,8 @@ def ratio_difference(
     What each run adds to the error of either ratio is subtracted run by run, so what they share
     falls out; the interval is that of the normal distribution. Its variance holds one run more that
     gains the event and one that loses it, of the weight of those below the line: as Bonett and
-    Price do for events without weights (`difference`), so that runs which all agree still leave as
-    much open as so many can. `alone` says how many runs only one condition has.
+    Price do for events without weights (`estimate_difference`), so that runs which all agree still
+    leave as much open as so many can. `alone` says how many runs only one condition has.
     """
     parts, ratios = [], []
     for below, above, weight, _, some, predicted in (first, second):
@@ -261,14 +263,14 @@ def ratio_difference(
     joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + more))
     # A ratio whose runs all agree has no such error; its interval tells another.
     alike = sum(
-        normal_error(estimate_of(ratio), confidence) ** 2
+        normal_error(ratio_as_estimate(ratio), confidence) ** 2
         for ratio, part in zip(ratios, each, strict=True)
         if np.abs(part).max() < 1e-12
     )
     apart = float(np.sqrt((each**2).sum() + alike + more))
     return EstimatedDifference(
-        symmetric(value, joint, each.shape[1], few, confidence),
-        symmetric(value, apart, each.shape[1], few, confidence),
+        normal_estimate(value, joint, each.shape[1], few, confidence),
+        normal_estimate(value, apart, each.shape[1], few, confidence),
         *alone,
     )
 
@@ -280,9 +282,9 @@ def _unseen_variance(nominal: FloatArray) -> float:
     proportion to their weights.
     """
     part, _ = scale_by_power_of_two(nominal)
-    return unseen_event(part)[1] / math.fsum(part) ** 2
+    return unseen_event_moments(part)[1] / math.fsum(part) ** 2
 
 
-def estimate_of(ratio: PairedRatio) -> Estimate:
+def ratio_as_estimate(ratio: PairedRatio) -> Estimate:
     """Return a ratio as the summary's other lines are."""
     return Estimate(ratio.ratio, *ratio.interval, ratio.clusters, ratio.few)

@@ -46,21 +46,21 @@ def draw_figures(
         if figure.kind == "run":
             paths += [] if draw_run is None else draw_run(figure.cell, figure.replica)
             continue
-        drawn = _stream(f"figure-{number + 1:02d}-{figure.kind}.png")
+        drawn = _figure_stream(f"figure-{number + 1:02d}-{figure.kind}.png")
         if draw_figure(drawn, tables, figure):
-            paths.append(_write(tables, drawn))
+            paths.append(_write_figure(tables, drawn))
     if tables.compared and tables.baseline is not None and tables.baseline[0].startswith("swap."):
         paths += _draw_scatters(tables, *tables.baseline, only)
     return paths
 
 
-def _stream(name: str) -> io.BytesIO:
+def _figure_stream(name: str) -> io.BytesIO:
     drawn = io.BytesIO()
     drawn.name = name
     return drawn
 
 
-def _write(tables: Tables, drawn: io.BytesIO) -> Path:
+def _write_figure(tables: Tables, drawn: io.BytesIO) -> Path:
     tables.folder.write_file(drawn.name, drawn.getvalue())
     return tables.folder.path / drawn.name
 
@@ -70,7 +70,7 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
     axes, metric = tables.rows.axes, str(figure.metric)
     if any(n is not None and n not in axes for n in (figure.axis, figure.x, figure.y)):
         return False
-    title = _shorten(tables.record.title if figure.title is None else figure.title)
+    title = _shorten_title(tables.record.title if figure.title is None else figure.title)
     confidence = tables.record.confidence
     if figure.kind in ("histogram", "cdf"):
         return _draw_spread(target, tables, figure, title)
@@ -104,7 +104,7 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
     return True
 
 
-def _shorten(title: str) -> str:
+def _shorten_title(title: str) -> str:
     return title if len(title) <= _LONGEST_TITLE else f"{title[: _LONGEST_TITLE - 1]}…"
 
 
@@ -155,10 +155,10 @@ def _draw_scatters(tables: Tables, axis: str, baseline: Any, only: Sequence[str]
         for metric in tables.notable_results(only):
             _, first, second = tables.rows.paired_values(metric, base, chosen)
             name = "-".join(["scatter", metric, *map(str, at)])
-            drawn = _stream(f"{safe_name(name)}.png")
+            drawn = _figure_stream(f"{safe_name(name)}.png")
             names = str(baseline), str(value)
-            draw_scatter(drawn, first, second, names, metric, _shorten(tables.record.title))
-            paths.append(_write(tables, drawn))
+            draw_scatter(drawn, first, second, names, metric, _shorten_title(tables.record.title))
+            paths.append(_write_figure(tables, drawn))
     return paths
 
 

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import PREFIX, lock_file, write_file
 from dsa_des.files.output_names import describe_write_error
-from dsa_des.files.sealed_files import ABOUT, is_sealed, open_lock, read_regular, seal
+from dsa_des.files.sealed_files import ABOUT, is_sealed, open_lock, read_regular, seal_content
 from dsa_des.record.failure_counts import FailureCounts, add_counts
 from dsa_des.results.record import StudyHead, StudyRecord
 
@@ -58,7 +58,7 @@ class Parts:
         """Write a part as a whole, sealed as one of the study, whoever else writes it too."""
         path = self.folder / PARTS / f"{name}.parquet"
         try:
-            write_file(path, seal(content, f"{self.study_sha256} {name}"), to_disk=True)
+            write_file(path, seal_content(content, f"{self.study_sha256} {name}"), to_disk=True)
         except OSError as error:
             raise NotWritten(error.strerror or str(error)) from None
 
@@ -293,7 +293,7 @@ class StudyFolder:
 
     def write_table(self, name: str, content: bytes) -> None:
         """Write a table beside the parts, sealed as one of this study."""
-        self.write_file(name, seal(content, self._owner(name)))
+        self.write_file(name, seal_content(content, self._owner(name)))
 
     def table(self, name: str) -> "pa.Table | None":
         """Return a table beside the parts; None if it is not there or not of this study."""

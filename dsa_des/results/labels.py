@@ -38,11 +38,11 @@ def unit_of(name: str) -> str:
     return _split_unit(name.partition(".")[0])[1]
 
 
-def readable(name: str) -> str:
+def readable_label(name: str) -> str:
     """Return ``Declaration range, radar (m)`` for ``declaration_range_m.radar``."""
     words, _, who = name.partition(".")
     words, unit = _split_unit(words)
-    what = _capital(_add_spaces(words)) + (f", {_add_spaces(who)}" if who else "")
+    what = _capitalise(_add_spaces(words)) + (f", {_add_spaces(who)}" if who else "")
     return figure_text(f"{what} ({unit})" if unit else what, 60)
 
 
@@ -52,7 +52,7 @@ def axis_label(key: str) -> str:
         return figure_text(f"Type of {_add_spaces(key.removeprefix('swap.'))}", 60)
     key = key.words if isinstance(key, AxisName) else key
     words, unit = _split_unit(key.removeprefix("blocks."))
-    label = _capital(_add_spaces(words.replace(".", " ")))
+    label = _capitalise(_add_spaces(words.replace(".", " ")))
     return figure_text(f"{label} ({unit})" if unit else label, 60)
 
 
@@ -66,14 +66,14 @@ def value_label(axis: str, value: object) -> str:
     return f"{figure_text(name, 50)} {value:g}{'' if unit in ('', '°') else ' '}{unit}"
 
 
-def short(value: object) -> str:
+def short_text(value: object) -> str:
     """Return a value for a table: numbers to five digits."""
     if isinstance(value, float):
         return "-" if value != value else f"{value:.5g}"
     return shorten(value)
 
 
-def rounded_to(half: float, *numbers: float) -> list[str]:
+def round_to_interval(half: float, *numbers: float) -> list[str]:
     """Return numbers as texts, rounded to two digits of half an interval."""
     places = 1 - math.floor(math.log10(half))
     return [f"{round(number, places) + 0.0:,.{max(places, 0)}f}" for number in numbers]
@@ -84,7 +84,7 @@ def format_with_interval(value: float, half: float) -> str:
     sign = "+" if value > 0 else ""
     if not 0.0 < half < math.inf:
         return sign + (f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}")
-    return sign + " ± ".join(rounded_to(half, value, half))
+    return sign + " ± ".join(round_to_interval(half, value, half))
 
 
 def _split_unit(name: str) -> tuple[str, str]:
@@ -115,5 +115,5 @@ def _is_abbreviation(word: str) -> bool:
     return two or word in _ABBREVIATIONS or bool(_CONSONANTS.fullmatch(word))
 
 
-def _capital(text: str) -> str:
+def _capitalise(text: str) -> str:
     return text[:1].upper() + text[1:]

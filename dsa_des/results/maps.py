@@ -9,8 +9,8 @@ import numpy as np
 
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import RED
-from dsa_des.record.drawing import drawing, figure_text, fit_axes_to_texts
-from dsa_des.results.labels import axis_label, readable, value_label
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts
+from dsa_des.results.labels import axis_label, readable_label, value_label
 from dsa_des.results.summary import Line
 
 #: Where a figure is drawn to.
@@ -40,7 +40,7 @@ def draw_heat(
     with np.errstate(invalid="ignore"):
         values = np.where(many > 0, total / many, np.nan)
     width = min(12.0, 3.0 + 0.62 * len(columns))
-    with drawing(max(5.0, width), min(10.0, 1.8 + 0.42 * len(rows) + 0.8), path) as figure:
+    with draw_to_png(max(5.0, width), min(10.0, 1.8 + 0.42 * len(rows) + 0.8), path) as figure:
         axes = figure.add_subplot()
         image = axes.imshow(values, aspect="auto", origin="lower", cmap="viridis")
         axes.spines[:].set_visible(False)
@@ -53,11 +53,13 @@ def draw_heat(
             for (r, c), value in np.ndenumerate(values):
                 if not np.isnan(value):
                     ink = "white" if value < middle else "black"
-                    axes.text(c, r, digits(value), ha="center", va="center", color=ink, size=8)
+                    axes.text(
+                        c, r, three_digits(value), ha="center", va="center", color=ink, size=8
+                    )
         axes.set_xlabel(axis_label(x))
         axes.set_ylabel(axis_label(y))
         axes.set_title(textwrap.fill(figure_text(title, _TITLE), 44), loc="left")
-        figure.colorbar(image, label=readable(metric))
+        figure.colorbar(image, label=readable_label(metric))
         fit_axes_to_texts(figure)
 
 
@@ -65,7 +67,7 @@ def _short_text(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else figure_text(value)
 
 
-def digits(value: float) -> str:
+def three_digits(value: float) -> str:
     """Return a number to three digits, or to whole ones."""
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
@@ -93,17 +95,17 @@ def draw_map(
     known = values[np.isfinite(values)]
     least, most = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
     size = 1.2 + 2.6 * wide + 1.0, 1.3 + 2.3 * tall + 0.3
-    with drawing(*size, path) as figure:
+    with draw_to_png(*size, path) as figure:
         grid = figure.subplots(tall, wide, squeeze=False, sharex=True, sharey=True)
         image = None
         for number, (at, some) in enumerate(list(panels.items())[: wide * tall]):
             axes = grid[number // wide, number % wide]
-            parts = _grids(some, across, up, columns, rows)
+            parts = _result_grids(some, across, up, columns, rows)
             image = axes.pcolormesh(
                 np.arange(len(columns)), np.arange(len(rows)), parts["value"], cmap="viridis_r",
                 vmin=least, vmax=most, shading="nearest",
             )  # fmt: skip
-            _contours(axes, parts, limits)
+            _draw_contours(axes, parts, limits)
             axes.set_xticks(range(len(columns)), [_short_text(v) for v in columns])
             axes.set_yticks(range(len(rows)), [_short_text(v) for v in rows])
             names = [value_label(axes_of[k], v) for k, v in zip(others, at, strict=True)]
@@ -124,14 +126,14 @@ def draw_map(
         figure.suptitle("\n".join(notes), x=0.02, ha="left", fontsize=9)
         fit_axes_to_texts(figure)
         if image is not None:
-            figure.colorbar(image, ax=list(grid.flat), label=readable(metric), shrink=0.9)
+            figure.colorbar(image, ax=list(grid.flat), label=readable_label(metric), shrink=0.9)
 
 
 def _axis_values(lines: Sequence[Line], index: int) -> list[Any]:
     return list(dict.fromkeys(line.at[index] for line in lines))
 
 
-def _grids(
+def _result_grids(
     lines: Sequence[Line], across: int, up: int, columns: list[Any], rows: list[Any]
 ) -> dict[str, FloatArray]:
     grids = {part: np.full((len(rows), len(columns)), np.nan) for part in _PARTS}
@@ -142,7 +144,7 @@ def _grids(
     return grids
 
 
-def _contours(axes: Any, parts: dict[str, FloatArray], limits: Sequence[float]) -> None:
+def _draw_contours(axes: Any, parts: dict[str, FloatArray], limits: Sequence[float]) -> None:
     for part, style in (("value", "-"), ("high", "--"), ("low", ":")):
         grid = parts[part]
         known = grid[np.isfinite(grid)]

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from dsa_des.record.failure_counts import failure_sentences
-from dsa_des.results.labels import rounded_to, short
+from dsa_des.results.labels import round_to_interval, short_text
 from dsa_des.results.statistics import Estimate
 from dsa_des.results.summary import Answer, Compared, Line, one_sided_confidence
 from dsa_des.results.tables import Tables, cut_off_text
@@ -18,7 +18,7 @@ _LONGEST = 300
 _MOST_SHOWN = 1000
 
 
-def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
+def print_study_tables(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
     """Print the tables of a study on a ``rich.console.Console``.
 
     `only` names results; by default those that the study draws or waits for, or else all.
@@ -35,11 +35,11 @@ def show(console: Any, tables: Tables, only: Sequence[str] = ()) -> None:
         e = line.estimate
         cut_off = cut_off_text(line)
         value, interval = round_estimate(e)
-        row = [*map(short, line.at), line.result.name, value]
+        row = [*map(short_text, line.at), line.result.name, value]
         row += [f"({cut_off})" if cut_off else "", interval, str(e.count)]
         row += ["" if sum(many for _, many in line.cut_off) >= line.missing else str(line.missing)]
         if expected:
-            row.append("" if line.expected is None else short(line.expected))
+            row.append("" if line.expected is None else short_text(line.expected))
         rows.append(row)
     headings += ["analytic"] if expected else []
     notes = {result.name: result.meaning for result in tables.results}
@@ -104,8 +104,8 @@ def answer_cells(tables: Tables, answer: Answer) -> list[str]:
     notes += ["few"] if estimate.few else []
     return [
         answer.requirement.text(), answer.requirement.axis, tables.other_axes_text(answer),
-        "none" if answer.value is None else short(answer.value), *round_estimate(estimate),
-        "none" if answer.estimated is None else short(answer.estimated),
+        "none" if answer.value is None else short_text(answer.value), *round_estimate(estimate),
+        "none" if answer.estimated is None else short_text(answer.estimated),
         "; ".join(notes),
     ]  # fmt: skip
 
@@ -138,10 +138,11 @@ def ratio_cells(line: Line) -> list[str]:
         if method not in by or by[method].interval[0] != by[method].interval[0]:
             return ""
         low, high = by[method].interval
-        return f"{short(low)} to {short(high)}" + (" *" if by[method].few else "")
+        return f"{short_text(low)} to {short_text(high)}" + (" *" if by[method].few else "")
 
     return [
-        line.result.name, short(ratio.unresolved), short(ratio.induced), interval("gamma"),
+        line.result.name, short_text(ratio.unresolved), short_text(ratio.induced),
+        interval("gamma"),
         interval("bootstrap"), f"{ratio.effective_sample_size:.1f} of {ratio.encounters}",
         ratio.reason
         or f"{ratio.nominal_events}, {ratio.mitigated_events}, {ratio.induced_events}",
@@ -151,7 +152,7 @@ def ratio_cells(line: Line) -> list[str]:
 
 def _show_ratios(console: Any, tables: Tables, lines: Sequence[Line]) -> None:
     """Print of what each ratio is made, and both of its intervals."""
-    rows = [[*map(short, line.at), *ratio_cells(line)] for line in lines[:_MOST_SHOWN]]
+    rows = [[*map(short_text, line.at), *ratio_cells(line)] for line in lines[:_MOST_SHOWN]]
     level = f"{100 * tables.record.confidence:g} %"
     headings = [*tables.rows.axes, *RATIO_HEADS]
     print_table(console, f"parts of the ratios, {level} intervals", headings, rows,
@@ -166,7 +167,7 @@ def gain_text(line: Line) -> str:
     """Return how many runs were flown for a ratio, and what that is worth."""
     ratio = line.ratio
     assert ratio is not None
-    at = "".join(f"{short(value)}: " for value in line.at)
+    at = "".join(f"{short_text(value)}: " for value in line.at)
     if ratio.flown == ratio.encounters:
         return f"{at}{line.result.name}: all {ratio.flown:,} runs were flown: nothing is gained"
     said = f"{at}{line.result.name}: {ratio.flown:,} of {ratio.encounters:,} runs were flown"
@@ -207,10 +208,11 @@ def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
         d = item.difference
         only = f"{d.only_first}/{d.only_second}" if d.only_first or d.only_second else ""
         rows.append(
-            [short(item.value), *map(short, item.at), item.result.name, *round_estimate(d.paired),
+            [short_text(item.value), *map(short_text, item.at), item.result.name,
+            *round_estimate(d.paired),
              str(d.paired.count), only, round_estimate(d.unpaired)[1].rstrip(" *")]
         )  # fmt: skip
-    title = f"less the same at {shorten(axis)} = {short(baseline)}, pair by pair"
+    title = f"less the same at {shorten(axis)} = {short_text(baseline)}, pair by pair"
     print_table(console, title, headings, rows, group=1 + len(others))
     if tables.record.compare_weight is not None:
         _show_event_ratios(console, tables, shown)
@@ -222,16 +224,17 @@ def _show_event_ratios(console: Any, tables: Tables, shown: Sequence[Compared]) 
     axis, baseline = tables.baseline
     others = [name for name in tables.rows.axes if name != axis]
     rows = [
-        [short(item.value), *map(short, item.at), item.result.name, short(item.ratio.ratio),
-         f"{short(item.ratio.interval[0])} to {short(item.ratio.interval[1])}"
+        [short_text(item.value), *map(short_text, item.at), item.result.name,
+        short_text(item.ratio.ratio),
+         f"{short_text(item.ratio.interval[0])} to {short_text(item.ratio.interval[1])}"
          + (" *" if item.ratio.few else ""),
-         short(item.ratio.unresolved), short(item.ratio.induced),
+         short_text(item.ratio.unresolved), short_text(item.ratio.induced),
          f"{item.ratio.effective_sample_size:.1f} of {item.ratio.encounters}", item.ratio.reason]
         for item in shown[:_MOST_SHOWN] if item.ratio is not None
     ]  # fmt: skip
     if rows:
         console.print()
-        title = f"events by those at {shorten(axis)} = {short(baseline)}, weighted by "
+        title = f"events by those at {shorten(axis)} = {short_text(baseline)}, weighted by "
         headings = [axis, *others, "event", "ratio", "interval", "unresolved", "induced",
                  "effective size", ""]  # fmt: skip
         print_table(console, title + str(tables.record.compare_weight), headings, rows,
@@ -242,7 +245,9 @@ def interval_text(estimate: Estimate) -> str:
     """Return an interval for a table; nothing without one, an asterisk where values are few."""
     if estimate.low != estimate.low:
         return ""
-    return f"{short(estimate.low)} to {short(estimate.high)}" + (" *" if estimate.few else "")
+    return f"{short_text(estimate.low)} to {short_text(estimate.high)}" + (
+        " *" if estimate.few else ""
+    )
 
 
 def round_estimate(estimate: Estimate) -> tuple[str, str]:
@@ -253,8 +258,8 @@ def round_estimate(estimate: Estimate) -> tuple[str, str]:
     )
     half = (high - low) / 2
     if not _NOTHING < half < math.inf:
-        return short(value), interval_text(replace(estimate, low=low, high=high))
-    shown = rounded_to(half, value, low, high)
+        return short_text(value), interval_text(replace(estimate, low=low, high=high))
+    shown = round_to_interval(half, value, low, high)
     return shown[0], f"{shown[1]} to {shown[2]}" + (" *" if estimate.few else "")
 
 

@@ -42,7 +42,7 @@ from dsa_des.results.statistics import (
     gamma_interval,
     resampled_ratios,
     scale_by_power_of_two,
-    unseen_event,
+    unseen_event_moments,
 )
 
 #: Intervals: by gamma distributions, of the logarithm of the ratio by its standard error, or of
@@ -148,11 +148,11 @@ def paired_ratio(
     ValueError
         Naming the first encounter (counted from 0) whose value cannot be used.
     """
-    n = _flags("nominal", nominal)
-    s = None if stands_for is None else _expansions(stands_for, len(n))
+    n = _checked_flags("nominal", nominal)
+    s = None if stands_for is None else _checked_expansions(stands_for, len(n))
     m = _flags_flown(mitigated, s)
     w, _ = scale_by_power_of_two(
-        _weights(weight, len(n))
+        _checked_weights(weight, len(n))
     )  # all that follows is of weights relative to each other
     if len(m) != len(n):
         raise ValueError(f"nominal has {len(n)} encounters and mitigated {len(m)}")
@@ -162,16 +162,16 @@ def paired_ratio(
         raise ValueError(f"confidence = {confidence}: must lie between 0 and 1")
     if resamples < 2:
         raise ValueError(f"resamples = {resamples}: must be 2 or more")
-    d = None if s is None or predicted is None else _flags("predicted", predicted)
+    d = None if s is None or predicted is None else _checked_flags("predicted", predicted)
     y = w * _estimated_flags(m, s, d)
-    terms = _terms(w, w * n, y, cluster)
+    terms = _ratio_terms_by_cluster(w, w * n, y, cluster)
     total, below = math.fsum(w), math.fsum(w * n)
     squares = math.fsum(terms[0] ** 2)
-    counts = len(n), *_counts(n, m, s)
+    counts = len(n), *_count_events(n, m, s)
     sizes = total * total / squares if squares > 0.0 else 0.0
     if below == 0.0:
         nan = math.nan
-        why = _explain_none(n, total)
+        why = _explain_no_ratio(n, total)
         share = (0.0, math.fsum(y) / total) if total > 0.0 else (nan, nan)
         return PairedRatio(
             nan, nan, nan, nan, (nan, nan), nan, sizes, *counts, *share, method, why,
@@ -207,15 +207,15 @@ def paired_ratio(
 
         reach = math.exp(float(ndtri(1.0 - tail)) * error / ratio)
         interval = ratio / reach, ratio * reach
-    few = method != "gamma" and math.fsum(y**2) < _FEW * unseen_event(np.maximum(x, y))[1]
+    few = method != "gamma" and math.fsum(y**2) < _FEW * unseen_event_moments(np.maximum(x, y))[1]
     return PairedRatio(
         ratio, added / below, left / below, error, interval, unpaired, sizes, *counts,
         below / total, above / total, method, "", few, len(each),
-        *_gain(n, m, w, s, d, ratio, squared),
+        *_flown_and_gain(n, m, w, s, d, ratio, squared),
     )  # fmt: skip
 
 
-def _gain(
+def _flown_and_gain(
     nominal: FloatArray, mitigated: FloatArray, weight: FloatArray, stands_for: FloatArray | None,
     predicted: FloatArray | None, ratio: float, sampled: float,
 ) -> tuple[int, float]:  # fmt: skip
@@ -283,10 +283,10 @@ def influences(
 
     Values are those of `paired_ratio`.
     """
-    n = _flags("nominal", nominal)
-    s = None if stands_for is None else _expansions(stands_for, len(n))
-    m, (w, _) = _flags_flown(mitigated, s), scale_by_power_of_two(_weights(weight, len(n)))
-    d = None if s is None or predicted is None else _flags("predicted", predicted)
+    n = _checked_flags("nominal", nominal)
+    s = None if stands_for is None else _checked_expansions(stands_for, len(n))
+    m, (w, _) = _flags_flown(mitigated, s), scale_by_power_of_two(_checked_weights(weight, len(n)))
+    d = None if s is None or predicted is None else _checked_flags("predicted", predicted)
     result: FloatArray = w * (_estimated_flags(m, s, d) - ratio * n) / math.fsum(w * n)
     return result
 
@@ -317,7 +317,7 @@ def redistribute_lost(stands_for: FloatArray, lost: Sequence[float], of: BoolArr
     return stands_for + others * more
 
 
-def _terms(
+def _ratio_terms_by_cluster(
     weight: FloatArray, below: FloatArray, above: FloatArray, cluster: npt.ArrayLike | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the weight, and the terms below and above the line, of every independent cluster."""
@@ -332,41 +332,45 @@ def _terms(
     return one, two, three
 
 
-def _flags(what: str, values: npt.ArrayLike) -> FloatArray:
+def _checked_flags(what: str, values: npt.ArrayLike) -> FloatArray:
     flags = np.asarray(values, dtype=np.float64)
     if flags.ndim != 1:
         raise ValueError(f"{what} has the shape {flags.shape}: one value per encounter is needed")
-    _refuse(what, flags, ~((flags >= 0.0) & (flags <= 1.0)), "must be 0 or 1, or a share between")
+    _refuse_values(
+        what, flags, ~((flags >= 0.0) & (flags <= 1.0)), "must be 0 or 1, or a share between"
+    )
     return flags
 
 
-def _weights(weight: npt.ArrayLike | None, count: int) -> FloatArray:
+def _checked_weights(weight: npt.ArrayLike | None, count: int) -> FloatArray:
     if weight is None:
         return np.ones(count)
     weights = np.asarray(weight, dtype=np.float64)
     if weights.shape != (count,):
         raise ValueError(f"weight has the shape {weights.shape}: {count} encounters have one each")
-    _refuse("weight", weights, ~(np.isfinite(weights) & (weights >= 0.0)), "must be 0 or more")
+    _refuse_values(
+        "weight", weights, ~(np.isfinite(weights) & (weights >= 0.0)), "must be 0 or more"
+    )
     return weights
 
 
-def _expansions(stands_for: npt.ArrayLike, count: int) -> FloatArray:
+def _checked_expansions(stands_for: npt.ArrayLike, count: int) -> FloatArray:
     result = np.asarray(stands_for, dtype=np.float64)
     if result.shape != (count,):
         raise ValueError(f"stands_for has the shape {result.shape}: {count} encounters have one")
     bad = ~(np.isfinite(result) & ((result == 0.0) | (result >= 1.0)))
-    _refuse("stands_for", result, bad, "must be 0, or 1 or more")
+    _refuse_values("stands_for", result, bad, "must be 0, or 1 or more")
     return result
 
 
 def _flags_flown(mitigated: npt.ArrayLike, stands_for: FloatArray | None) -> FloatArray:
     """Return the mitigated flags, 0 of those that were not flown."""
     if stands_for is None:
-        return _flags("mitigated", mitigated)
-    return _flags("mitigated", np.where(stands_for > 0.0, mitigated, 0.0))
+        return _checked_flags("mitigated", mitigated)
+    return _checked_flags("mitigated", np.where(stands_for > 0.0, mitigated, 0.0))
 
 
-def _counts(
+def _count_events(
     nominal: FloatArray, mitigated: FloatArray, stands_for: FloatArray | None
 ) -> tuple[int, int, int]:
     """Count encounters with the event nominally, mitigated, and mitigated more than nominally."""
@@ -380,7 +384,7 @@ def _counts(
     )
 
 
-def _refuse(what: str, values: FloatArray, bad: AnyArray, allowed: str) -> None:
+def _refuse_values(what: str, values: FloatArray, bad: AnyArray, allowed: str) -> None:
     if bad.any():
         index = int(np.argmax(bad))
         value = float(values[index])
@@ -388,7 +392,7 @@ def _refuse(what: str, values: FloatArray, bad: AnyArray, allowed: str) -> None:
         raise ValueError(f"{what} of encounter {index} is {shown}: {allowed}")
 
 
-def _explain_none(nominal: FloatArray, total: float) -> str:
+def _explain_no_ratio(nominal: FloatArray, total: float) -> str:
     if total == 0.0:
         return "there is no encounter" if len(nominal) == 0 else "all weights are 0"
     if nominal.any():

@@ -39,7 +39,7 @@ TRIALS = ".trials"
 STANDS_FOR = "stands_for"
 
 
-class Told(NamedTuple):
+class ChangeWords(NamedTuple):
     """The words for a change of a result: ``radar``, ``sees a target earlier``, ``... later``.
 
     Parameters
@@ -128,7 +128,7 @@ class Result:
     kind: Annotated[str, Field(pattern="^(number|fraction|event|share|ratio|class|key)$")]
     meaning: str
     cut_off: str | None = None
-    told: Told | None = None
+    told: ChangeWords | None = None
     block: str | None = None
     mark: tuple[_Colour, _Marker] | None = None
     ratio: RatioOf | None = None

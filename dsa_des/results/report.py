@@ -17,7 +17,7 @@ from markupsafe import Markup
 from dsa_des.files.sealed_files import read_regular
 from dsa_des.record.failure_counts import failure_sentences
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.labels import AxisName, axis_label, readable, short, value_label
+from dsa_des.results.labels import AxisName, axis_label, readable_label, short_text, value_label
 from dsa_des.results.models import (
     EffectRecord,
     MeasuredErrors,
@@ -58,7 +58,7 @@ def study_report(folder: StudyFolder) -> bytes:
     explain = run_command(record.scene, record.seed, record.swaps, record.sets)
     explain = explain.replace("dsa-des run ", "dsa-des explain ", 1)
     begun, now = explained.versions if explained else {}, versions()
-    pictures = _pictures(folder)
+    pictures = _figure_contents(folder)
     answering = [one for one in pictures if "map" in one[0] or "requirement" in one[0]]
     answering = answering or pictures[:1]
     page = page_environment().from_string(PAGE_HEAD + page_part("study.html")).render(
@@ -67,7 +67,8 @@ def study_report(folder: StudyFolder) -> bytes:
         explain=explain, most=_MOST_ROWS, runs=len(tables.rows.places) + tables.rows.failed,
         version=begun.get("dsa_des", now.get("dsa_des", "")), asked=_requested_rows(tables),
         axes=[
-            (axis_label(AxisName(axis.column, axis.words)), ", ".join(map(_value, axis.values[:40]))
+            (axis_label(AxisName(axis.column, axis.words)), ", ".join(map(_value_text,
+            axis.values[:40]))
              + ", …" * (len(axis.values) > 40),
              "a sample: its values are independent units" if axis.over else "")
             for axis in record.axes
@@ -76,25 +77,26 @@ def study_report(folder: StudyFolder) -> bytes:
         changes=[("set", f"{key} = {value}") for key, value in record.sets]
         + [("swap", f"{block} = {name}") for block, name in record.swaps],
         bounds=[
-            (e.block, e.effect, ", ".join(f"{q} {short(b)}" for q, b in sorted(e.bound.items())),
+            (e.block, e.effect, ", ".join(f"{q} {short_text(b)}" for q,
+            b in sorted(e.bound.items())),
              "simulated" if e.simulated else "left out")
             for scene in (explained.scenes if explained else ()) for e in scene.effects if e.bound
         ],
         heads=[*map(axis_label, tables.rows.axes), "result", "value", "interval", "units",
                "no value", "note", "cut off", "expected"],
-        shown=[_line(line) for line in tables.shown_lines()[:_MOST_SHOWN]],
-        lines=[_line(line, exact=True) for line in tables.lines[:_MOST_ROWS]],
+        shown=[_summary_cells(line) for line in tables.shown_lines()[:_MOST_SHOWN]],
+        lines=[_summary_cells(line, exact=True) for line in tables.lines[:_MOST_ROWS]],
         few=any(line.estimate.few for line in tables.lines),
-        level=f"{100 * record.confidence:g} %", methods=_methods(tables),
+        level=f"{100 * record.confidence:g} %", methods=_interval_methods_text(tables),
         axis_heads=list(map(axis_label, tables.rows.axes)),
-        ratio_heads=list(RATIO_HEADS), pivots=_pivots(tables),
-        ratios=[(*map(_value, r.at), *ratio_cells(r)) for r in tables.ratios()[:_MOST_ROWS]],
+        ratio_heads=list(RATIO_HEADS), pivots=_requirement_tables(tables),
+        ratios=[(*map(_value_text, r.at), *ratio_cells(r)) for r in tables.ratios()[:_MOST_ROWS]],
         sure=f"{100 * one_sided_confidence(record.confidence):g} %",
         others=[axis_label(n) for n in tables.rows.axes
                 if tables.baseline and n != tables.baseline[0]],
         differences=[
-            (*map(_value, item.at), _value(item.value), _value(item.baseline),
-             readable(item.result.name), *round_estimate(item.difference.paired),
+            (*map(_value_text, item.at), _value_text(item.value), _value_text(item.baseline),
+             readable_label(item.result.name), *round_estimate(item.difference.paired),
              item.difference.paired.count)
             for item in tables.compared[:_MOST_ROWS]
             if item.result in {line.result for line in tables.shown_lines()}
@@ -108,7 +110,7 @@ def study_report(folder: StudyFolder) -> bytes:
         ],
         undone=failure_sentences(folder.failure_counts()),
         packages=[(name, begun.get(name, ""), now.get(name, "")) for name in {**begun, **now}],
-        hashes=_hashes(folder),
+        hashes=_file_hashes(folder),
         commands=[
             record.repeat or f"dsa-des study {record.study}",
             f"dsa-des study show {folder.path}",
@@ -123,21 +125,21 @@ def study_report(folder: StudyFolder) -> bytes:
 def page_environment() -> Environment:
     """Return the language of the page: whatever it is given is shown as text, on one line."""
     environment = Environment(
-        autoescape=True, finalize=_text, undefined=StrictUndefined, trim_blocks=True
+        autoescape=True, finalize=_escaped_text, undefined=StrictUndefined, trim_blocks=True
     )
     environment.filters.update(
-        verbatim=_verbatim,
+        verbatim=_unchanged_lines,
         filled=_drop_empty_columns,
         plain=Markup,
         axis=axis_label,
-        models=_models,
+        models=_model_rows,
         measured=_error_rows,
-        effects=_effects,
+        effects=_effect_rows,
     )
     return environment
 
 
-def _text(value: Any) -> Markup:
+def _escaped_text(value: Any) -> Markup:
     """Return a value as text of a page, on one line and of bounded length."""
     if isinstance(value, Markup):
         return value
@@ -153,29 +155,29 @@ def _drop_empty_columns(
     return [heads[k] for k in kept], [[row[k] for k in kept] for row in rows]
 
 
-def _verbatim(lines: Iterable[str]) -> Markup:
+def _unchanged_lines(lines: Iterable[str]) -> Markup:
     """Return lines as they stand."""
     some = list(lines)[:_MOST_ROWS]
     return Markup("<pre>" + "\n".join(escape(printable(line)) for line in some) + "</pre>")
 
 
-def _line(line: Line, exact: bool = False) -> tuple[Any, ...]:
+def _summary_cells(line: Line, exact: bool = False) -> tuple[Any, ...]:
     """Return one line of the summary as the cells of a row: rounded, or with the table's name."""
     e = line.estimate
-    said = (readable(line.result.name), *round_estimate(e))
+    said = (readable_label(line.result.name), *round_estimate(e))
     if exact:
-        said = (line.result.name, short(e.value), interval_text(e))
+        said = (line.result.name, short_text(e.value), interval_text(e))
     return (
-        *map(_value, line.at), *said, e.count, line.missing, "few" if e.few else "",
-        cut_off_text(line), "" if line.expected is None else short(line.expected),
+        *map(_value_text, line.at), *said, e.count, line.missing, "few" if e.few else "",
+        cut_off_text(line), "" if line.expected is None else short_text(line.expected),
     )  # fmt: skip
 
 
-def _value(value: Any) -> str:
-    return short(value) if isinstance(value, float) else str(value)
+def _value_text(value: Any) -> str:
+    return short_text(value) if isinstance(value, float) else str(value)
 
 
-def _methods(tables: Tables) -> str:
+def _interval_methods_text(tables: Tables) -> str:
     """Return which interval belongs to which kind of result."""
     kinds = {line.result.kind for line in tables.lines}
     means = "studentised bootstrap" if tables.record.interval == "bootstrap" else "Student's t"
@@ -188,7 +190,7 @@ def _methods(tables: Tables) -> str:
     return ", ".join(methods)
 
 
-def _pivots(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:
+def _requirement_tables(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:
     """Return a table for each requirement, with the values of the last other axis side by side."""
     pivots = []
     for requirement in tables.record.requirements:
@@ -199,25 +201,25 @@ def _pivots(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:
         along = tables.rows.axes[tables.rows.axes.index(requirement.axis)]
         title = f"{axis_label(along)} for {requirement.text()}"
         if not others:
-            pivots.append((title, ["cheapest"], [[_cheapest(mine[0])]]))
+            pivots.append((title, ["cheapest"], [[_cheapest_texts(mine[0])]]))
             continue
         columns = list(dict.fromkeys(one.at[-1] for one in mine))
         rows: dict[tuple[Any, ...], dict[Any, str]] = {}
         for one in mine:
-            rows.setdefault(one.at[:-1], {})[one.at[-1]] = _cheapest(one)
+            rows.setdefault(one.at[:-1], {})[one.at[-1]] = _cheapest_texts(one)
         heads = [axis_label(name) for name in others[:-1]]
         heads += [value_label(others[-1], column) for column in columns]
         pivots.append((title, heads, [
-            [*map(_value, at), *(cells.get(column, "") for column in columns)]
+            [*map(_value_text, at), *(cells.get(column, "") for column in columns)]
             for at, cells in rows.items()
         ]))  # fmt: skip
     return pivots
 
 
-def _cheapest(answer: Answer) -> str:
+def _cheapest_texts(answer: Answer) -> str:
     """Return the cheapest value that meets a requirement, and the one by the estimate alone."""
-    sure = "none" if answer.value is None else _value(answer.value)
-    alone = "none" if answer.estimated is None else _value(answer.estimated)
+    sure = "none" if answer.value is None else _value_text(answer.value)
+    alone = "none" if answer.estimated is None else _value_text(answer.estimated)
     notes = [f"({alone})"] if alone != sure else []
     notes += ["few"] if answer.line.estimate.few else []
     notes += ["uneven"] if answer.uneven else []
@@ -238,21 +240,22 @@ def _requested_rows(tables: Tables) -> list[tuple[str, Any]]:
     return rows + [("drawn", draw.key) for draw in record.draws]
 
 
-def _models(scene: SceneRecord) -> list[tuple[str, ...]]:
+def _model_rows(scene: SceneRecord) -> list[tuple[str, ...]]:
     return [(m.block, m.type, m.about, "; ".join(m.rungs)) for m in scene.models]
 
 
 def _error_rows(errors: MeasuredErrors) -> list[tuple[Any, ...]]:
     return [
-        (e.block, f"{e.ladder}: {e.rung}", f"{e.quantity}, {e.unit}", short(e.mean), short(e.p95),
-         short(e.largest), e.target_scans,
+        (e.block, f"{e.ladder}: {e.rung}", f"{e.quantity}, {e.unit}", short_text(e.mean),
+        short_text(e.p95),
+         short_text(e.largest), e.target_scans,
          # Another model, or for a reference something far better.
          f"its own error, {e.against}" if e.against.startswith("measured") else e.against)
         for e in errors.rows
     ]  # fmt: skip
 
 
-def _effects(effects: Sequence[EffectRecord], simulated: bool) -> list[tuple[str, str, str]]:
+def _effect_rows(effects: Sequence[EffectRecord], simulated: bool) -> list[tuple[str, str, str]]:
     """Return in which blocks each effect is simulated, or is not, for one reason."""
     together: dict[tuple[str, str], list[str]] = {}
     for e in effects:
@@ -261,7 +264,7 @@ def _effects(effects: Sequence[EffectRecord], simulated: bool) -> list[tuple[str
     return [(", ".join(blocks), effect, why) for (effect, why), blocks in together.items()]
 
 
-def _pictures(folder: StudyFolder) -> list[tuple[str, str, str]]:
+def _figure_contents(folder: StudyFolder) -> list[tuple[str, str, str]]:
     """Return stem, name and content of the folder's figures."""
     pictures = []
     for path in sorted(folder.path.glob("*.png"))[:_MOST_PICTURES]:
@@ -273,7 +276,7 @@ def _pictures(folder: StudyFolder) -> list[tuple[str, str, str]]:
     return pictures
 
 
-def _hashes(folder: StudyFolder) -> list[tuple[str, str]]:
+def _file_hashes(folder: StudyFolder) -> list[tuple[str, str]]:
     files = [folder.parts / f"{name}.parquet" for name in folder.part_names()[:_MOST_PARTS]]
     hashes = [(file.name, hashlib.sha256(read_regular(file)).hexdigest()) for file in files]
     return [("study, with all that fixes its results", folder.record.study_sha256), *hashes]

@@ -17,10 +17,10 @@ from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.results.differences import (
     EstimatedDifference,
     RatioTerms,
-    difference,
-    estimate_of,
+    estimate_difference,
     paired_units,
     quantile_difference,
+    ratio_as_estimate,
     ratio_difference,
 )
 from dsa_des.results.folder import StudyFolder
@@ -39,11 +39,11 @@ from dsa_des.results.record import (
 )
 from dsa_des.results.statistics import (
     Estimate,
-    fraction,
-    mean,
-    quantile,
-    rare,
-    share,
+    estimate_bounded_mean,
+    estimate_mean,
+    estimate_quantile,
+    estimate_rare_mean,
+    estimate_share,
 )
 
 if TYPE_CHECKING:
@@ -256,7 +256,7 @@ class Rows:
         """Return the estimate of a result over some rows, and how many rows have no value."""
         if result.kind == RATIO:
             ratio, missing = self.ratio(result, rows, confidence, method)
-            return estimate_of(ratio), missing
+            return ratio_as_estimate(ratio), missing
         if self.is_sampled(result.name):
             return self._estimate_sampled_share(result, rows, confidence)
         values = self.column(result.name)[rows].astype(float)
@@ -264,13 +264,13 @@ class Rows:
         if result.kind not in (EVENT, SHARE):
             _, of_units = self.mean_by_unit(result.name, rows)
             if result.quantile is not None:
-                return quantile(of_units, result.quantile, confidence), missing
+                return estimate_quantile(of_units, result.quantile, confidence), missing
             if result.kind == FRACTION:
-                return fraction(of_units, confidence), missing
+                return estimate_bounded_mean(of_units, confidence), missing
             if result.unseen is not None:
                 more = self.mean_by_unit(result.unseen, rows)[1]
-                return rare(of_units, more, confidence), missing
-            return mean(of_units, confidence, method), missing
+                return estimate_rare_mean(of_units, more, confidence), missing
+            return estimate_mean(of_units, confidence, method), missing
         trials = np.ones(len(rows))
         if result.kind == SHARE:
             trials = np.nan_to_num(self.column(result.name + TRIALS)[rows].astype(float))
@@ -278,7 +278,7 @@ class Rows:
         units, index = np.unique(self.units[rows], return_inverse=True)
         won = np.bincount(index, weights=np.nan_to_num(values) * trials, minlength=len(units))
         tried = np.bincount(index, weights=trials, minlength=len(units))
-        return share(won.astype(float), tried.astype(float), confidence), missing
+        return estimate_share(won.astype(float), tried.astype(float), confidence), missing
 
     def _estimate_sampled_share(
         self, result: Result, rows: IntArray, confidence: float
@@ -292,7 +292,7 @@ class Rows:
             stands_for[known], cluster=self.units[rows][known],
             predicted=self.predicted_events(result.name, rows[known]), confidence=confidence,
         )  # fmt: skip
-        return estimate_of(ratio), int((~known).sum())
+        return ratio_as_estimate(ratio), int((~known).sum())
 
     def ratio(
         self, result: Result, rows: IntArray, confidence: float, method: str
@@ -364,7 +364,7 @@ class Rows:
         _, one, two = self.paired_values(result.name, first, second)
         if result.quantile is not None:
             return quantile_difference(one, two, result.quantile, confidence)
-        return difference(one, two, confidence, method, kind=result.kind)
+        return estimate_difference(one, two, confidence, method, kind=result.kind)
 
     def _ratio_difference(
         self, result: Result, first: IntArray, second: IntArray, confidence: float

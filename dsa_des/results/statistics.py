@@ -48,7 +48,7 @@ def clip_estimate(result: Estimate, least: float | None, most: float | None) -> 
     return replace(result, low=low, high=high) if result.low <= result.high else result
 
 
-def wilson(successes: float, trials: float, confidence: float) -> tuple[float, float]:
+def wilson_interval(successes: float, trials: float, confidence: float) -> tuple[float, float]:
     """Return Wilson's score interval of a share.
 
     Trials may be an effective number, and need not be whole.
@@ -74,7 +74,7 @@ def normal_quantile(confidence: float) -> float:
     return NormalDist().inv_cdf(0.5 + confidence / 2.0)
 
 
-def share(successes: FloatArray, trials: FloatArray, confidence: float) -> Estimate:
+def estimate_share(successes: FloatArray, trials: FloatArray, confidence: float) -> Estimate:
     """Return a share over independent units, each with trials that may hang together.
 
     The interval is Wilson's with the effective number of trials: units that differ more from each
@@ -104,7 +104,7 @@ def share(successes: FloatArray, trials: FloatArray, confidence: float) -> Estim
         effective = total / max(1.0, spread / plain)
     elif clustered:
         effective = float(units)
-    low, high = wilson(value * effective, effective, confidence)
+    low, high = wilson_interval(value * effective, effective, confidence)
     few = effective < FEW or (clustered and _has_few_units(successes, trials))
     return Estimate(value, low, high, units, few)
 
@@ -115,7 +115,7 @@ def _has_few_units(successes: FloatArray, trials: FloatArray) -> bool:
     return bool(len(trials) < FEW or unlike < FEW_UNLIKE)
 
 
-def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
+def estimate_mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
     """Return the mean of independent values; NaN ones are left out.
 
     `method` is "t" or "bootstrap": Student's t, or the studentised bootstrap over 2000 resamples
@@ -133,19 +133,19 @@ def mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
     error = standard_error(values)
     below = above = t_quantile(count - 1, confidence)
     if method == "bootstrap":
-        below, above = _bootstrap(part, confidence) or (below, above)
+        below, above = _bootstrap_reach(part, confidence) or (below, above)
     low, high = value - below * error, value + above * error
     return Estimate(value, low, high, count, count < FEW)
 
 
-def rare(values: FloatArray, more: FloatArray, confidence: float) -> Estimate:
+def estimate_rare_mean(values: FloatArray, more: FloatArray, confidence: float) -> Estimate:
     """Return the mean of independent estimates of one rare probability; NaN ones are left out.
 
     Such estimates are products, and skewed: the interval is that of Student's t for the logarithm
     of the mean. Where all are 0 it ends where Poisson's law lets nothing be seen as often as an end
     may err; `more` is what one event more would have added to each.
     """
-    plain = mean(values, confidence)
+    plain = estimate_mean(values, confidence)
     if plain.count < 2:
         return plain
     if plain.value > 0.0:
@@ -156,7 +156,7 @@ def rare(values: FloatArray, more: FloatArray, confidence: float) -> Estimate:
     return replace(plain, high=min(1.0, expected * float(known.mean()) / len(known)))
 
 
-def quantile(values: FloatArray, share: float, confidence: float) -> Estimate:
+def estimate_quantile(values: FloatArray, share: float, confidence: float) -> Estimate:
     """Return a quantile over independent units, whose interval lies between two order statistics.
 
     Either end errs with at most half the probability that is left (H. A. David and H. N. Nagaraja,
@@ -180,23 +180,25 @@ def quantile(values: FloatArray, share: float, confidence: float) -> Estimate:
     return Estimate(float(value), float(low), float(high), count, few)
 
 
-def fraction(values: FloatArray, confidence: float) -> Estimate:
+def estimate_bounded_mean(values: FloatArray, confidence: float) -> Estimate:
     """Return the mean of independent values between 0 and 1; NaN ones are left out.
 
     The interval is Wilson's with as many trials as would make a share as uncertain as the mean is
     by Student's t, so it stays between 0 and 1; where all values are alike each is one trial.
     """
-    plain = mean(values, confidence)
+    plain = estimate_mean(values, confidence)
     if plain.count < 2:
         return plain
     error = normal_error(plain, confidence)
     spread = plain.value * (1.0 - plain.value)
     trials = spread / error**2 if spread > 0.0 and error > 1e-9 else float(plain.count)
-    low, high = wilson(plain.value * trials, trials, confidence)
+    low, high = wilson_interval(plain.value * trials, trials, confidence)
     return Estimate(plain.value, low, high, plain.count, plain.few)
 
 
-def symmetric(value: float, error: float, count: int, few: bool, confidence: float) -> Estimate:
+def normal_estimate(
+    value: float, error: float, count: int, few: bool, confidence: float
+) -> Estimate:
     """Return an estimate whose interval is that of the normal distribution."""
     half = normal_quantile(confidence) * error
     return Estimate(value, value - half, value + half, count, few)
@@ -234,7 +236,7 @@ def t_quantile(degrees: float, confidence: float) -> float:
     return float(stdtrit(degrees, 0.5 + confidence / 2.0))
 
 
-def _bootstrap(values: FloatArray, confidence: float) -> tuple[float, float] | None:
+def _bootstrap_reach(values: FloatArray, confidence: float) -> tuple[float, float] | None:
     """Return how many standard errors an interval reaches below and above the mean.
 
     None where most resamples hold one value only, so that they tell nothing.
@@ -266,7 +268,7 @@ def chi_square_bounds(freedom: float, share: float = 0.95) -> tuple[float, float
     return low, high
 
 
-def unseen_event(terms: FloatArray) -> tuple[float, float]:
+def unseen_event_moments(terms: FloatArray) -> tuple[float, float]:
     """Return what one event more adds to a weighted sum, on average, and to its variance."""
     once = math.fsum(terms)
     return math.fsum(terms**2) / once, math.fsum(terms**3) / once
@@ -335,7 +337,7 @@ def gamma_interval(
             (stay[1] - limit * stay[0], limit**2 * stay[2] - 2.0 * limit * stay[3] + stay[4]),
         )
 
-    more, heaviest = unseen_event(np.maximum(x, y)), float(x.max())
+    more, heaviest = unseen_event_moments(np.maximum(x, y)), float(x.max())
 
     def confidence_below(limit: float) -> float:
         """Return how sure it is that the ratio is below a limit."""

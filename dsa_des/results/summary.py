@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.results.differences import EstimatedDifference, estimate_of
+from dsa_des.results.differences import EstimatedDifference, ratio_as_estimate
 from dsa_des.results.ratio import PairedRatio, paired_ratio
 from dsa_des.results.record import (
     EVENT,
@@ -52,7 +52,7 @@ def summarise(
             ratio = other = None
             if result.kind == RATIO:
                 ratio, missing = rows.ratio(result, chosen, confidence, method)
-                estimate = estimate_of(ratio)
+                estimate = ratio_as_estimate(ratio)
                 # Drawing sets again takes a while; of classes it is done only where it is asked.
                 if method == "bootstrap":
                     other, _ = rows.ratio(result, chosen, confidence, "t")
@@ -145,7 +145,9 @@ class Answer:
     uneven: bool
 
 
-def answers(requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]) -> list[Answer]:
+def cheapest_values(
+    requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]
+) -> list[Answer]:
     """Return the cheapest value at every combination of the other axes' values."""
     if requirement.axis not in axes:
         return []

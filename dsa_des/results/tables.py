@@ -3,16 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dsa_des.files.sealed_files import parquet
+from dsa_des.files.sealed_files import sealable_parquet
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.labels import AxisName, short
+from dsa_des.results.labels import AxisName, short_text
 from dsa_des.results.record import FRACTION, NUMBER, StudyRecord
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.results.summary import (
     Answer,
     Compared,
     Line,
-    answers,
+    cheapest_values,
     compare_axis,
     one_sided_confidence,
     summarise,
@@ -48,7 +48,7 @@ class Tables:
         self.answers: list[Answer] = [
             result
             for requirement in record.requirements
-            for result in answers(requirement, self.rows.axes, self.lines)
+            for result in cheapest_values(requirement, self.rows.axes, self.lines)
         ]
         self.compared: list[Compared] = []
         #: The axis along which values are compared, and with which.
@@ -105,42 +105,44 @@ class Tables:
     def _ratio_columns(self) -> dict[str, list[Any]]:
         """Return all numbers of the ratios, with both kinds of interval."""
         lines = self.ratios()
-        columns = _values_at(self.rows.axes, lines) | _columns(lines, result="result.name")
+        columns = _axis_value_columns(self.rows.axes, lines) | _columns_at_paths(
+            lines, result="result.name"
+        )
         names = (
             "ratio", "unresolved", "induced", "effective_sample_size", "encounters", "clusters",
             "nominal_events", "mitigated_events", "induced_events", "nominal_probability",
             "mitigated_probability", "few", "reason", "flown", "gain",
         )  # fmt: skip
-        columns |= _columns(lines, **{name: f"ratio.{name}" for name in names})
+        columns |= _columns_at_paths(lines, **{name: f"ratio.{name}" for name in names})
         for method in ("gamma", "bootstrap"):
             of_method = [
                 next((r for r in (line.ratio, line.other) if r and r.method == method), None)
                 for line in lines
             ]
-            columns |= _columns(
+            columns |= _columns_at_paths(
                 of_method,
                 **{f"{method}_error": "standard_error"},
                 **{f"{method}_low": "interval.0", f"{method}_high": "interval.1"},
             )
-        return columns | _columns(lines, missing="missing")
+        return columns | _columns_at_paths(lines, missing="missing")
 
     def _summary_columns(self) -> dict[str, list[Any]]:
         return {
-            **_values_at(self.rows.axes, self.lines),
-            **_columns(
+            **_axis_value_columns(self.rows.axes, self.lines),
+            **_columns_at_paths(
                 self.lines, result="result.name", value="estimate.value", low="estimate.low",
                 high="estimate.high", count="estimate.count", missing="missing",
                 few="estimate.few",
             ),
             "cut_off": [sum(many for _, many in line.cut_off) for line in self.lines],
             "cut_off_where": [cut_off_text(line) for line in self.lines],
-            **_columns(self.lines, expected="expected"),
+            **_columns_at_paths(self.lines, expected="expected"),
         }  # fmt: skip
 
     def other_axes_text(self, answer: Answer) -> str:
         """Return the values of the other axes: ``radar.scan_rate_hz = 1, radar.latency_s = 0``."""
         names = [name for name in self.rows.axes if name != answer.requirement.axis]
-        return ", ".join(f"{n} = {short(v)}" for n, v in zip(names, answer.at, strict=True))
+        return ", ".join(f"{n} = {short_text(v)}" for n, v in zip(names, answer.at, strict=True))
 
     def _answer_columns(self) -> dict[str, list[Any]]:
         result = self.answers
@@ -148,12 +150,12 @@ class Tables:
             "requirement": [item.requirement.text() for item in result],
             "axis": [item.requirement.axis for item in result],
             "others": [self.other_axes_text(item) for item in result],
-            "cheapest": [None if item.value is None else short(item.value) for item in result],
+            "cheapest": [None if item.value is None else short_text(item.value) for item in result],
             "confidence": [one_sided_confidence(self.record.confidence)] * len(result),
             "cheapest_by_estimate": [
-                None if item.estimated is None else short(item.estimated) for item in result
+                None if item.estimated is None else short_text(item.estimated) for item in result
             ],
-            **_columns(
+            **_columns_at_paths(
                 result, value="line.estimate.value", low="line.estimate.low",
                 high="line.estimate.high", few="line.estimate.few", uneven="uneven",
             ),
@@ -164,9 +166,9 @@ class Tables:
         axis = self.baseline[0]
         others = [name for name in self.rows.axes if name != axis]
         return {
-            **_values_at(others, self.compared),
-            **_columns(self.compared, **{axis: "value"}),
-            **_columns(
+            **_axis_value_columns(others, self.compared),
+            **_columns_at_paths(self.compared, **{axis: "value"}),
+            **_columns_at_paths(
                 self.compared, baseline="baseline", result="result.name",
                 difference="difference.paired.value", low="difference.paired.low",
                 high="difference.paired.high", unpaired_low="difference.unpaired.low",
@@ -197,12 +199,12 @@ def cut_off_text(line: Line) -> str:
     return ", ".join(texts)
 
 
-def _values_at(axes: Sequence[str], items: Sequence[Any]) -> dict[str, list[Any]]:
+def _axis_value_columns(axes: Sequence[str], items: Sequence[Any]) -> dict[str, list[Any]]:
     """Return the values of some axes at items that are `at` them."""
     return {name: [item.at[k] for item in items] for k, name in enumerate(axes)}
 
 
-def _columns(items: Sequence[Any], /, **paths: str) -> dict[str, list[Any]]:
+def _columns_at_paths(items: Sequence[Any], /, **paths: str) -> dict[str, list[Any]]:
     """Return columns of the values at dotted paths in items; None behind what is None."""
     return {name: [_value_at(item, path) for item in items] for name, path in paths.items()}
 
@@ -217,4 +219,4 @@ def _value_at(item: Any, path: str) -> Any:
 def _parquet(columns: dict[str, list[Any]]) -> bytes:
     import pyarrow as pa
 
-    return parquet(pa.table(columns))
+    return sealable_parquet(pa.table(columns))

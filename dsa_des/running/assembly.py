@@ -6,13 +6,13 @@ from fractions import Fraction
 from typing import Any
 
 from dsa_des.block.component import Component, Consumer, Context, Producer
-from dsa_des.block.foreign_calls import REFUSALS, describe_error, error_text, is_stop_request
+from dsa_des.block.foreign_calls import REFUSALS, describe_error, error_with_kind, is_stop_request
 from dsa_des.errors import BlockFailure, Problem, RunRefused, SceneError, SetupFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.effects import Planned, WrapEffect, build_effects
-from dsa_des.running.loops import telling_order
+from dsa_des.running.loops import offer_order
 from dsa_des.running.timeline import Timeline
-from dsa_des.scene.platforms import platforms_of
+from dsa_des.scene.platforms import platform_by_block
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK
@@ -42,7 +42,7 @@ class Assembly:
         self._everything = simulate_everything
         self._rewinds = rewinds
         self._scenes = [scene, *(stretch.scene for stretch in scene.stretches)]
-        self._place = telling_order(scene.graph, scene.classes)
+        self._place = offer_order(scene.graph, scene.classes)
         #: The blocks of each stretch, the first one that of the start.
         self.stretches: list[dict[str, Component]] = [{} for _ in self._scenes]
         for number in range(len(self._scenes)):
@@ -77,7 +77,7 @@ class Assembly:
                         components[name].apply_change(from_s, made)
                     else:
                         components[name] = made
-        _raise_any(problems)
+        _raise_if_problems(problems)
 
     def _differs(self, name: str, number: int) -> bool:
         """Return whether a block's parameters, or sections, are others than in the last stretch."""
@@ -129,7 +129,7 @@ class Assembly:
 
     def _assign_platforms(self) -> None:
         """Tell every block what carries it, which no change alters."""
-        self.platforms = platforms_of(self._scene, self._sources)
+        self.platforms = platform_by_block(self._scene, self._sources)
         on, first = set(self.platforms.values()), {names[0] for names in self._sources.values()}
         #: Whether blocks are on several platforms, or on another one than the first.
         self.is_shared = len(on) > 1 or bool(self._sources and on - first)
@@ -167,7 +167,7 @@ class Assembly:
                 problems: list[Problem] = []
                 with self._preparing(name, problems):
                     components[name] = self._make_component(name, number)
-                _raise_any(problems)
+                _raise_if_problems(problems)
                 components[name].context.platform = told_by.context.platform
             components[name].context.producers = producers
 
@@ -199,7 +199,7 @@ class Assembly:
                     planned[id(component)] = build_effects(
                         component, tolerance, everything=self._everything, wrap=wrap
                     )
-        _raise_any(problems)
+        _raise_if_problems(problems)
         return [
             [item for component in of.values() for item in planned[id(component)]]
             for of in self.stretches
@@ -218,7 +218,7 @@ class Assembly:
                 if [*component.records()] != [*each[0].records()]:
                     message = "records something else after a change: that it cannot"
                     problems.append(self._scene.problem(f"blocks.{name}", message))
-        _raise_any(problems)
+        _raise_if_problems(problems)
 
     def _consumers(self, name: str) -> list[Consumer]:
         """Return the blocks that a block feeds, with all that each of them asks."""
@@ -248,7 +248,7 @@ class Assembly:
             if is_stop_request(error):
                 raise
             path = self._scene.blocks[name].cls.path()
-            raise SetupFailure(name, path, 0.0, None, error_text(error)) from error
+            raise SetupFailure(name, path, 0.0, None, error_with_kind(error)) from error
 
     def _call_method(self, component: Component, what: str, *arguments: Any) -> Any:
         """Return what a method of a block returns before the run."""
@@ -256,7 +256,7 @@ class Assembly:
         answer = None
         with self._preparing(component.name, problems):
             answer = getattr(component, what)(*arguments)
-        _raise_any(problems)
+        _raise_if_problems(problems)
         return answer
 
 
@@ -268,6 +268,6 @@ def _is_equal(one: Any, other: Any) -> bool:
         return False
 
 
-def _raise_any(problems: list[Problem]) -> None:
+def _raise_if_problems(problems: list[Problem]) -> None:
     if problems:
         raise SceneError(problems)

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run, union
+from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run, union_of_instants
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Input
 from dsa_des.block.message import Message
@@ -103,7 +103,9 @@ class Channel:
                 arrivals, message = arrivals.take(order), message.take(order)
         if self._runs.count > 1 and (self.delay_ticks or self._faults is not None):
             # What would arrive after its run does not: nothing would wait for it there.
-            arrivals, message = _rows(arrivals, message, arrivals.tick < self._runs.run_ticks)
+            arrivals, message = _select_rows(
+                arrivals, message, arrivals.tick < self._runs.run_ticks
+            )
         if len(arrivals) == 0:
             return arrivals
         self._waiting.append((arrivals, message))
@@ -133,7 +135,7 @@ class Channel:
             return RunTicks.empty()
         if self._faults is None and 1 in (len(arriving), len(self._runs.going)):
             return RunTicks.concatenate(arriving)
-        return union(arriving)  # late rows overtake and may coincide
+        return union_of_instants(arriving)  # late rows overtake and may coincide
 
     def quiet_until(self) -> int:
         """Return a tick before which nothing arrives of what waits."""
@@ -183,7 +185,7 @@ class Channel:
             collected = _sort_rows(collected)
         if collected is None or not self._runs.early:
             return collected
-        collected = _rows(*collected, self._runs.is_before_ends(collected[0]))
+        collected = _select_rows(*collected, self._runs.is_before_ends(collected[0]))
         return collected if len(collected[0]) else None
 
     def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
@@ -194,7 +196,7 @@ class Channel:
         """
         new = self.collect(end)
         if new is not None:
-            rows = last_of_run(new[0], asked)
+            rows = last_position_in_run(new[0], asked)
             if rows[0] >= 0 and (len(rows) == 1 or bool((rows >= 0).all())):
                 # What was before need not be looked up.
                 self._pass(new, end)
@@ -208,7 +210,7 @@ class Channel:
         self._passed = [held]
         if self._runs.count > 1:
             self._remember(end)
-        return held[1], last_of_run(held[0], asked)
+        return held[1], last_position_in_run(held[0], asked)
 
     def _pass(self, new: Rows, end: int) -> None:
         """Take note of rows of which every run that asked holds one."""
@@ -243,7 +245,7 @@ class Channel:
         self._passed = [] if held is None else [_last_of_each_run(*_sort_rows(held))]
 
 
-def _rows(arrivals: RunTicks, message: Message, kept: BoolArray) -> Rows:
+def _select_rows(arrivals: RunTicks, message: Message, kept: BoolArray) -> Rows:
     if kept.all():
         return arrivals, message
     rows = np.flatnonzero(kept)

@@ -44,7 +44,7 @@ class Planned:
 WrapEffect = Callable[[Planned, Any], Any]
 
 
-def plan(
+def plan_effects(
     block: Component, tolerance: Mapping[str, float], *, everything: bool = False
 ) -> list[Planned]:
     """Decide which of a block's effects are built.
@@ -74,7 +74,7 @@ def build_effects(
     wrap: WrapEffect | None = None,
 ) -> list[Planned]:
     """Decide which of a block's effects are built, as `plan`, and give them to its context."""
-    planned = plan(block, tolerance, everything=everything)
+    planned = plan_effects(block, tolerance, everything=everything)
     built = {item: _build_effect(block, item.effect) for item in planned if item.built}
     if not everything:
         block.context.tolerance = remaining_tolerance(planned, tolerance)
@@ -175,7 +175,7 @@ OF_CLOCKS = (
 )
 
 
-def timing_plan(scene: Scene, *, everything: bool = False) -> list[Planned]:
+def plan_timing_effects(scene: Scene, *, everything: bool = False) -> list[Planned]:
     """Return the verdict on each timing effect, one entry for each block or wire that it acts on.
 
     Where a scene calls for an effect nowhere, or only in some places, one entry speaks for all
@@ -212,7 +212,7 @@ def _plan_key(effect: _OfKey, places: list[tuple[str, Any]], everything: bool) -
     yield Planned(place, effect, rest[0], built, because)
 
 
-def may_be_late(wire: Wire, everything: bool) -> bool:
+def may_lose_or_delay(wire: Wire, everything: bool) -> bool:
     """Return whether loss and jitter are drawn for the messages of a wire."""
     return everything or LOSS.verdict(wire).simulated or WIRE_JITTER.verdict(wire).simulated
 

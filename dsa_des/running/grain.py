@@ -6,19 +6,25 @@ from fractions import Fraction
 
 import networkx as nx
 
-from dsa_des.block.component import Component, ends_its_run
+from dsa_des.block.component import Component, may_end_its_run
 from dsa_des.errors import SceneError
 from dsa_des.errors.budgets import MOST_SCANS
-from dsa_des.running.loops import Edge, blocks_before_loops, cut_loops, opened_loops, shortest_s
+from dsa_des.running.loops import (
+    Edge,
+    blocks_before_loops,
+    cut_loops,
+    edges_opening_loops,
+    shortest_delay_s,
+)
 from dsa_des.running.node import Node
-from dsa_des.scene.graph import cycle_numbers, queue_key, window_order, with_queues
+from dsa_des.scene.graph import add_queue_nodes, cycle_numbers, queue_key, window_order
 from dsa_des.scene.queue_policy import QueuePolicy, find_policy
 from dsa_des.scene.scene import Scene
 from dsa_des.time.run_clock import RunClock
 from dsa_des.time.runs import Runs
 
 
-def _without_windows(scene: Scene) -> dict[str, str]:
+def _blocks_without_windows(scene: Scene) -> dict[str, str]:
     """Return the blocks of a scene that no window of a loop can hold, and why each."""
     reasons = {}
     for name, block in sorted(scene.blocks.items()):
@@ -40,7 +46,7 @@ def _explain_fast_feedback(scene: Scene, opened: Collection[Edge]) -> dict[str, 
         edge[0]: "sends back sooner than the next scan, and not all blocks can be rewound: "
         f"{', '.join(stuck)}"
         for edge in sorted(opened)
-        if shortest_s(scene, edge) * per_s < 1
+        if shortest_delay_s(scene, edge) * per_s < 1
     }
 
 
@@ -73,7 +79,7 @@ def windowed_queues(scene: Scene) -> set[str]:
     policies = {name: find_policy(p.when_busy) for name, p in scene.processors.items()}
     able = {name for name, policy in policies.items() if policy.skips is QueuePolicy.skips}
     while able:
-        looped = cycle_numbers(with_queues(scene.graph, {name: queues[name] for name in able}))
+        looped = cycle_numbers(add_queue_nodes(scene.graph, {name: queues[name] for name in able}))
         windowed = windowed_blocks(scene, able)
         left = {n for n in able if queue_key(n) not in looped and windowed.issuperset(queues[n])}
         if left == able:
@@ -116,7 +122,7 @@ class Grain:
         return window_order(scene.graph, self.windowed, self.cut_edges, self.queues, first)
 
 
-def grain_of(scene: Scene, window: int | None) -> Grain:
+def choose_grain(scene: Scene, window: int | None) -> Grain:
     """Return at which grain the blocks of a scene run; `window` is that of `Simulation`.
 
     Loops run in windows: as long as an open loop's, which are undone if something came back, where
@@ -126,9 +132,13 @@ def grain_of(scene: Scene, window: int | None) -> Grain:
         return Grain(set(), False, set(), {})
     slow: dict[str, str] = {}
     if cycle_numbers(scene.graph):
-        slow, opened, every = _without_windows(scene), opened_loops(scene), set(scene.blocks)
+        slow, opened, every = (
+            _blocks_without_windows(scene),
+            edges_opening_loops(scene),
+            set(scene.blocks),
+        )
         # Who looks ahead of a run's end must not fail there.
-        ending = any(ends_its_run(cls) for cls in scene.classes.values())
+        ending = any(may_end_its_run(cls) for cls in scene.classes.values())
         ahead = blocks_before_loops(scene.graph)
         if not slow and all(cls.rewindable for cls in scene.classes.values()):
             return Grain(every, True, cut_loops(scene.graph, scene.classes), {}, ahead=ahead)
@@ -137,7 +147,9 @@ def grain_of(scene: Scene, window: int | None) -> Grain:
             return Grain(every, False, opened, {}, ahead=set() if ending else ahead)
     queues = {name: scene.queues[name] for name in sorted(windowed_queues(scene))}
     windowed = windowed_blocks(scene, queues)
-    return Grain(windowed, False, set(), slow or _holding_blocks(scene, windowed), queues)
+    return Grain(
+        windowed, False, set(), slow or _blocks_that_prevent_windows(scene, windowed), queues
+    )
 
 
 def blocks_held_back(scene: Scene, windowed: Collection[str]) -> list[str]:
@@ -146,12 +158,12 @@ def blocks_held_back(scene: Scene, windowed: Collection[str]) -> list[str]:
     return sorted(n for n in scene.blocks if _can_take_windows(classes[n]) and n not in windowed)
 
 
-def _holding_blocks(scene: Scene, windowed: Collection[str]) -> dict[str, str]:
+def _blocks_that_prevent_windows(scene: Scene, windowed: Collection[str]) -> dict[str, str]:
     """Return the blocks behind which others run scan by scan, and why each does."""
     kept = set(blocks_held_back(scene, windowed))
     return {
         name: why
-        for name, why in _without_windows(scene).items()
+        for name, why in _blocks_without_windows(scene).items()
         if name not in windowed
         and not _can_take_windows(scene.classes[name])
         and kept & nx.descendants(scene.graph, name)
@@ -166,7 +178,7 @@ def _can_take_windows(cls: type[Component]) -> bool:
 CELLS_PER_WINDOW = 131072
 
 
-def scans_of(nodes: Mapping[str, Node], runs: Runs) -> float:
+def scans_per_run(nodes: Mapping[str, Node], runs: Runs) -> float:
     """Return how many scans of all clocks together each run has, about."""
     return float(sum(runs.run_ticks / clock.period for clock in _clocks(nodes.values())))
 

@@ -14,7 +14,7 @@ from dsa_des.scene.scene import Scene
 Edge = tuple[str, str]
 
 
-def _closing(graph: nx.DiGraph, rank: Callable[[Edge], Any]) -> set[Edge]:
+def _edges_closing_loops(graph: nx.DiGraph, rank: Callable[[Edge], Any]) -> set[Edge]:
     """Return delayed edges without which a graph has no loop: of each loop one of the highest rank.
 
     An edge is taken out only if it closes a loop of edges of its rank or lower ones.
@@ -43,7 +43,7 @@ def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[
 
     Edges into inputs that a block can do without are the first to go: that is where a loop closes.
     """
-    return _closing(graph, lambda edge: _optional(graph, classes, edge))
+    return _edges_closing_loops(graph, lambda edge: _is_optional_edge(graph, classes, edge))
 
 
 def blocks_before_loops(graph: nx.DiGraph) -> set[str]:
@@ -53,21 +53,23 @@ def blocks_before_loops(graph: nx.DiGraph) -> set[str]:
     return set(graph) - behind if looped else set()
 
 
-def _optional(graph: nx.DiGraph, classes: Mapping[str, type[Component]], edge: Edge) -> bool:
+def _is_optional_edge(
+    graph: nx.DiGraph, classes: Mapping[str, type[Component]], edge: Edge
+) -> bool:
     """Whether the receiving block can do without what comes over an edge."""
     inputs = classes[edge[1]].inputs
     return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
 
 
-def opened_loops(scene: Scene) -> set[Edge]:
+def edges_opening_loops(scene: Scene) -> set[Edge]:
     """Return delayed edges without which the scene has no loop, those of the longest delays.
 
     The shortest of those taken out is as long as can be.
     """
-    return _closing(scene.graph, lambda edge: shortest_s(scene, edge))
+    return _edges_closing_loops(scene.graph, lambda edge: shortest_delay_s(scene, edge))
 
 
-def shortest_s(scene: Scene, edge: Edge) -> Fraction:
+def shortest_delay_s(scene: Scene, edge: Edge) -> Fraction:
     """Return the shortest delay of the wires from one block to another, s."""
     wires = [wire for wire in scene.wires if (wire.source, wire.target) == edge]
     return min(wire.total_delay_s + wire.delay_scans * _period_s(scene, edge) for wire in wires)
@@ -83,7 +85,7 @@ def _period_s(scene: Scene, edge: Edge) -> Fraction:
     return Fraction(0)
 
 
-def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> dict[str, int]:
+def offer_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> dict[str, int]:
     """Return the place of each block in the order in which blocks tell each other what they offer.
 
     Requests go the other way. Both pass over wires with and without delay; loops are opened at
@@ -95,7 +97,7 @@ def telling_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> 
         return not any(port.required for port in classes[edge[1]].inputs.values())
 
     opened = nx.DiGraph(graph)
-    for opens in (of_source, lambda edge: _optional(graph, classes, edge)):
+    for opens in (of_source, lambda edge: _is_optional_edge(graph, classes, edge)):
         if not (looped := cycle_numbers(opened)):
             break
         inside = [e for e in opened.edges if looped.get(e[0], -1) == looped.get(e[1], -2)]

@@ -14,10 +14,10 @@ import simpy
 
 from dsa_des.arrays.run_ticks import (
     RunTicks,
-    last_of_run,
+    last_position_in_run,
     positions_among,
     runs_of_single,
-    union,
+    union_of_instants,
 )
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Component, RunEnd
@@ -238,7 +238,7 @@ class Node:
             for wire in self._trigger_wires:
                 wire.collect(tick + 1)  # what came to be worked on now is left out with it
             return
-        self._run(_instant_of(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
+        self._run(_single_instant(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
 
     def _run_window(self, start: int, end: int) -> None:
         if self.clock is not None:
@@ -253,14 +253,14 @@ class Node:
             scans = _no_scan_numbers(len(instants))
             if len(own) and self.clock is not None:
                 scans = scans.copy()
-                scans[last_of_run(instants, own)] = numbers
+                scans[last_position_in_run(instants, own)] = numbers
         idle = None
         if self.pulse is not None and len(pulses := self.pulse.between(start, end)[1]):
             busy = instants
             instants = _concatenate([busy, pulses])
             idle = np.ones(len(instants), dtype=bool)
             if len(busy):
-                rows = last_of_run(instants, busy)
+                rows = last_position_in_run(instants, busy)
                 scans, numbers = np.full(len(instants), -1), scans
                 scans[rows], idle[rows] = numbers, False
             else:
@@ -332,7 +332,7 @@ class Node:
         self._missed = False
         tick = int(self.simulation.env.now)
         scans = np.array([-1], dtype=np.int64)
-        wake = self._inputs.wake_at(_instant_of(tick), scans, tick + 1, complete=False)
+        wake = self._inputs.wake_at(_single_instant(tick), scans, tick + 1, complete=False)
         assert wake is not None
         return wake
 
@@ -378,7 +378,7 @@ def _concatenate(parts: Sequence[RunTicks]) -> RunTicks:
     """Return the instants of all parts."""
     filled = [part for part in parts if len(part.tick)]
     if len(filled) > 1:
-        return union(filled)
+        return union_of_instants(filled)
     return filled[0] if filled else RunTicks.empty()
 
 
@@ -390,5 +390,5 @@ def _no_scan_numbers(rows: int) -> IntArray:
     return _NO_SCAN[:rows]
 
 
-def _instant_of(tick: int) -> RunTicks:
+def _single_instant(tick: int) -> RunTicks:
     return RunTicks(runs_of_single(1), np.array([tick], dtype=np.int64))

@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 
 import simpy
 
-from dsa_des.block.component import Component, ends_its_run
+from dsa_des.block.component import Component, may_end_its_run
 from dsa_des.block.message import Message
 from dsa_des.errors import SceneError
 from dsa_des.running.events import DEPTH_PRIORITY, WINDOW_PRIORITY, RunState
@@ -15,7 +15,7 @@ from dsa_des.running.node import Node
 from dsa_des.running.processors import Processor, Service
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Demand
-from dsa_des.scene.graph import depths, queue_key
+from dsa_des.scene.graph import block_depths, queue_key
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK
@@ -33,15 +33,15 @@ def build_nodes(
     """Return the running blocks, which no wire connects yet."""
     scene, components = timeline.scene, stretches[0]
     # Who ends runs comes before all that it does not depend on: that is not run beyond the end.
-    ending = [name for name, block in components.items() if ends_its_run(type(block))]
-    depth, order = depths(scene.graph, ending), grain.order(scene, ending)
+    ending = [name for name, block in components.items() if may_end_its_run(type(block))]
+    depth, order = block_depths(scene.graph, ending), grain.order(scene, ending)
     shuffle = None if shuffle_ties is None else random.Random(shuffle_ties)
     nodes = {}
     for number, (name, component) in enumerate(sorted(components.items())):
         windowed = name in grain.windowed
         base = WINDOW_PRIORITY + order[name] if windowed else DEPTH_PRIORITY + depth[name]
         by_name = base + number / (len(components) + 1)
-        node = Node(run, component, windowed, _priority(base, by_name, shuffle))
+        node = Node(run, component, windowed, _make_priority(base, by_name, shuffle))
         node.runner = timeline.runner(component)
         node.stretched = timeline.stretched([of[name] for of in stretches])
         node.clock = timeline.clock(name, component)
@@ -81,13 +81,15 @@ def build_processors(
     return processors
 
 
-def _priority(base: float, by_name: float, shuffle: random.Random | None) -> Callable[[], float]:
+def _make_priority(
+    base: float, by_name: float, shuffle: random.Random | None
+) -> Callable[[], float]:
     if shuffle is None:
         return lambda: by_name
     return lambda: base + shuffle.random()
 
 
-def connect(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None:
+def connect_nodes(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None:
     """Lay every wire, and tell each block whose scans its rows are for.
 
     A `SceneError` says which delay makes no sense, or which block that runs on demand has nobody to

@@ -93,10 +93,10 @@ class Pacer:
         said = self.report()
         return (
             f"paced at {self.factor:g} x wall clock: behind by at most "
-            f"{_lag(said['max_lag_s'])}, {_lag(said['mean_lag_s'])} on average, "
+            f"{_lag_text(said['max_lag_s'])}, {_lag_text(said['mean_lag_s'])} on average, "
             f"over {self.windows} windows"
         )
 
 
-def _lag(lag_s: float) -> str:
+def _lag_text(lag_s: float) -> str:
     return f"{1000 * lag_s:.1f} ms" if lag_s < 10 else f"{lag_s:.1f} s"

@@ -301,7 +301,9 @@ class Processor:
                 entry.send()
             return
         rows = (blocks, tick, service, [entries[n] for n in of.tolist()], number)
-        jobs = [_Job(*row) for row in zip(*(_plain(values) for values in rows), strict=True)]
+        jobs = [
+            _Job(*row) for row in zip(*(_list_of_integers(values) for values in rows), strict=True)
+        ]
         for now, group in groupby(jobs, key=lambda job: job.entered):
             self._finish(now)
             self._enter(now, group)
@@ -329,5 +331,5 @@ class Processor:
         return ends
 
 
-def _plain(values: Any) -> list[Any]:
+def _list_of_integers(values: Any) -> list[Any]:
     return values.tolist() if isinstance(values, np.ndarray) else values

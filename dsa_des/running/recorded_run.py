@@ -18,10 +18,10 @@ from dsa_des.record.failure_counts import failure_sentences
 from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import write_run_json
-from dsa_des.record.sinks import ObserverSink, attempt
+from dsa_des.record.sinks import ObserverSink, call_or_note
 from dsa_des.record.version import __version__
 from dsa_des.running.pacing import Pacer
-from dsa_des.running.reports import draw_all, load_reports, notes_of_scene, say_if_long
+from dsa_des.running.reports import draw_all_reports, load_reports, notes_of_scene, warn_of_long_run
 from dsa_des.running.simulation import Outcome, Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal import terminal
@@ -62,7 +62,7 @@ def record_run(
     if prepare is not None:
         prepare(simulation)
     if say_notes:
-        say_if_long(simulation)
+        warn_of_long_run(simulation)
     noted = notes_of_scene(simulation)
     if noted and notes_command is not None:
         say(f"{len(noted)} note{'s' * (len(noted) > 1)}: {notes_command}", err=True)
@@ -86,12 +86,12 @@ def record_run(
                 outcome = simulation.run(progress or bar, pacer)
         finally:
             tables.release()
-        summary = summary_of(observers, outcome, target.path, notes)
+        summary = summarise_run(observers, outcome, target.path, notes)
         if pacer is not None:
             summary["realtime"] = pacer.report()
         write_file(folder / "scene.toml", scene_text.encode())
         wall_s = time.perf_counter() - started
-        info = info_of(simulation, recorder, outcome, summary, scene_text, wall_s)
+        info = run_json_content(simulation, recorder, outcome, summary, scene_text, wall_s)
         if pacer is not None and pacer.stopped:
             info["duration_s"], info["stopped"] = pacer.time_s, True
         if noted or notes:
@@ -101,7 +101,7 @@ def record_run(
     # The run has its name: whatever happens while figures are drawn, it is not lost.
     try:
         if draw:
-            notes += draw_all(reports, simulation, target.path, summary)
+            notes += draw_all_reports(reports, simulation, target.path, summary)
         write_run_json(target.path, info)  # with the figures among its files
     except OSError as error:
         what = f"figures cannot be written: {error.strerror or error}"
@@ -111,13 +111,13 @@ def record_run(
     return summary
 
 
-def summary_of(
+def summarise_run(
     observers: ObserverSink, outcome: Outcome, target: Path | None, notes: list[str]
 ) -> dict[str, Any]:
     """Return what a run came to: what observers and blocks say of it."""
     return {
         **observers.result(),
-        **(attempt("the summary of the blocks", notes, lambda: outcome.report) or {}),
+        **(call_or_note("the summary of the blocks", notes, lambda: outcome.report) or {}),
         **({"undone": outcome.failure_counts} if failure_sentences(outcome.failure_counts) else {}),
         "simulated_s": outcome.duration_s,
         "cpu_s": outcome.cpu_s,
@@ -125,7 +125,7 @@ def summary_of(
     }
 
 
-def info_of(
+def run_json_content(
     simulation: Simulation,
     recorder: Recorder,
     outcome: Outcome,

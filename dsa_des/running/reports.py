@@ -9,7 +9,7 @@ from dsa_des.block.component import RunEnd
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.foreign import load_installed
 from dsa_des.record.run_folder import REPORTS
-from dsa_des.record.sinks import Observer, attempt
+from dsa_des.record.sinks import Observer, call_or_note
 from dsa_des.running.grain import blocks_held_back
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.graph import cycle_numbers
@@ -38,9 +38,9 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
         notes += [f"{name}: {text}" for text in section.ineffective_key_notes()]
     for name, component in simulation.components.items():
         notes += [f"blocks.{name}: {text}" for text in component.p.ineffective_key_notes()]
-        for text in attempt(f"blocks.{name}: warnings", notes, component.warnings) or ():
+        for text in call_or_note(f"blocks.{name}: warnings", notes, component.warnings) or ():
             notes.append(f"blocks.{name}: {shorten(str(text), _LONGEST)}")
-        notes += [f"blocks.{name}: {text}" for text in _vain_times(simulation, name)]
+        notes += [f"blocks.{name}: {text}" for text in _notes_of_idle_options(simulation, name)]
     notes += _notes_of_vain_work(simulation)
     for text in _notes_of_stretches(simulation, notes):
         notes.append(text)
@@ -57,7 +57,7 @@ def _notes_of_stretches(simulation: Simulation, said: list[str]) -> Iterator[str
                 continue
             notes: list[str] = []
             texts = list(component.p.ineffective_key_notes())
-            texts += attempt(f"blocks.{name}: warnings", notes, component.warnings) or ()
+            texts += call_or_note(f"blocks.{name}: warnings", notes, component.warnings) or ()
             new = [text for text in texts if f"blocks.{name}: {text}" not in said]
             for text in (*notes, *new):
                 begins_s = f"from {float(stretch.from_s):g} s"
@@ -96,7 +96,7 @@ def _notes_of_vain_work(simulation: Simulation) -> Iterator[str]:
             first.append(name)
 
 
-def _vain_times(simulation: Simulation, name: str) -> Iterator[str]:
+def _notes_of_idle_options(simulation: Simulation, name: str) -> Iterator[str]:
     """List times of a block by which it does nothing in this run, or not what they say."""
     scene, ends_s = simulation.scene, simulation.duration_s
     component = simulation.components[name]
@@ -146,11 +146,13 @@ def _drop_acknowledged(scene: Scene, notes: list[str]) -> list[str]:
     return [
         text
         for text in notes
-        if not any(_begins(text, head, begin) for head, said in known.items() for begin in said)
+        if not any(
+            _note_begins_with(text, head, begin) for head, said in known.items() for begin in said
+        )
     ]
 
 
-def _begins(note: str, head: str, begin: str) -> bool:
+def _note_begins_with(note: str, head: str, begin: str) -> bool:
     """Return whether a note on `head` begins so, or what it says of a file, an aircraft, a key."""
     if not begin or not note.startswith((f"{head}: ", f"{head}.")):
         return False
@@ -158,7 +160,7 @@ def _begins(note: str, head: str, begin: str) -> bool:
     return rest.startswith(begin) or f": {begin}" in rest
 
 
-def say_notes(notes: Sequence[str]) -> None:
+def print_notes(notes: Sequence[str]) -> None:
     """Print notes on standard error."""
     for text in notes[:MOST_NOTES]:
         say(f"note: {text}", err=True)
@@ -170,7 +172,7 @@ def say_notes(notes: Sequence[str]) -> None:
 _MANY_SCANS = 1e7
 
 
-def say_if_long(simulation: Simulation) -> None:
+def warn_of_long_run(simulation: Simulation) -> None:
     """Say on standard error that a run will take long, before it does."""
     if simulation.scans > _MANY_SCANS:
         message = f"note: {float(simulation.duration_s):.4g} s of this scene are about "
@@ -247,7 +249,7 @@ def load_reports() -> list[Report]:
     return [load_installed(point)() for point in entry_points_of(REPORTS).values()]
 
 
-def draw_all(
+def draw_all_reports(
     reports: Iterable[Report], simulation: "Simulation", folder: Path, summary: dict[str, Any]
 ) -> list[str]:
     """Let every report draw its figures of a finished run, and return what went wrong.
@@ -258,5 +260,5 @@ def draw_all(
     """
     notes: list[str] = []
     for report in reports:
-        attempt("drawing", notes, report.draw, simulation, folder, summary, unless=OSError)
+        call_or_note("drawing", notes, report.draw, simulation, folder, summary, unless=OSError)
     return notes

@@ -16,21 +16,21 @@ from typing import Any
 import simpy
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.block.component import Component, ends_its_run
-from dsa_des.block.foreign_calls import error_at, is_stop_request
+from dsa_des.block.component import Component, may_end_its_run
+from dsa_des.block.foreign_calls import error_with_line, is_stop_request
 from dsa_des.block.message import Message
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.failure_counts import FailureCounts, FailuresByRun, sum_runs
 from dsa_des.record.recording import NotRecordedError, Recorder
 from dsa_des.running.assembly import Assembly
-from dsa_des.running.effects import Planned, WrapEffect, timing_plan
+from dsa_des.running.effects import Planned, WrapEffect, plan_timing_effects
 from dsa_des.running.events import Abort
-from dsa_des.running.grain import longest_window, refuse_endless_work, scans_of
+from dsa_des.running.grain import longest_window, refuse_endless_work, scans_per_run
 from dsa_des.running.nodes import (
     build_nodes,
     build_processors,
     check_reach,
-    connect,
+    connect_nodes,
     horizon_ticks,
 )
 from dsa_des.running.pacing import Pacer
@@ -138,10 +138,10 @@ class Simulation:
         self.nodes = build_nodes(
             self, self.timeline, self.stretches, grain, self._processors, shuffle_ties
         )
-        connect(scene, self.nodes, self.timeline)
+        connect_nodes(scene, self.nodes, self.timeline)
         check_reach(scene, self.nodes, self.runs.run_ticks)
         #: How many scans of all clocks together a run has, about.
-        self.scans = scans_of(self.nodes, self.runs)
+        self.scans = scans_per_run(self.nodes, self.runs)
         refuse_endless_work(scene, self.scans, float(self.duration_s))
         rewinder = None
         if grain.rewinds:
@@ -160,7 +160,7 @@ class Simulation:
     def timing_plan_of(self, stretch: int) -> list[Planned]:
         """Return the same of a stretch of the scene, 0 for that at its start."""
         scene = self.scene.stretches[stretch - 1].scene if stretch else self.scene
-        return timing_plan(scene, everything=self._everything)
+        return plan_timing_effects(scene, everything=self._everything)
 
     @property
     def end_tick(self) -> int:
@@ -246,7 +246,7 @@ class Simulation:
     def _check_ends(self) -> None:
         """Refuse what ends its run where messages wait for a processor: they would be lost."""
         if self.scene.processors:
-            ending = [n for n, cls in sorted(self.scene.classes.items()) if ends_its_run(cls)]
+            ending = [n for n, cls in sorted(self.scene.classes.items()) if may_end_its_run(cls)]
             said = "it ends its run early, which a scene with shared processors does not allow"
             if ending:
                 raise SceneError(
@@ -342,4 +342,4 @@ def block_failure(
 ) -> BlockFailure:
     """Return the error message for an exception that a block raised at an instant."""
     cls = type(component)
-    return BlockFailure(component.name, cls.path(), time_s, scan, error_at(error, cls))
+    return BlockFailure(component.name, cls.path(), time_s, scan, error_with_line(error, cls))

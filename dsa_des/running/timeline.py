@@ -14,8 +14,8 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.record.failure_counts import FailuresByRun, counts_by_run
 from dsa_des.running.channel import Channel
-from dsa_des.running.effects import WireFaults, may_be_late
-from dsa_des.running.grain import Grain, grain_of
+from dsa_des.running.effects import WireFaults, may_lose_or_delay
+from dsa_des.running.grain import Grain, choose_grain
 from dsa_des.running.windows import Rewinder, RewindingWindows, Windows
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
@@ -27,7 +27,7 @@ from dsa_des.time.run_clock import RunClock
 from dsa_des.time.runs import Runs
 
 
-def _no_jitter(number: int) -> Callable[[IntArray], FloatArray]:
+def _zero_jitter_draw(number: int) -> Callable[[IntArray], FloatArray]:
     return lambda scans: np.zeros(len(scans))
 
 
@@ -87,7 +87,7 @@ class Timeline:
         if every_s is None:
             return None
         specs = [ClockSpec(1 / every_s, every_s)] * self.runs.count
-        return RunClock(specs, self.scene.ticks_per_s, self.runs, _no_jitter)
+        return RunClock(specs, self.scene.ticks_per_s, self.runs, _zero_jitter_draw)
 
     def clock_specs(
         self, name: str, component: Component, stretch: int | None = None
@@ -111,7 +111,7 @@ class Timeline:
         delays = np.array([round(one.total_delay_s * per_s) for one in wires], dtype=np.int64)
         least = int(delays.min())
         faults = None
-        if any(may_be_late(one, self._everything) for one in wires) or (delays > least).any():
+        if any(may_lose_or_delay(one, self._everything) for one in wires) or (delays > least).any():
             late, lost = (self.streams.stream(str(wire), f"wire {of}") for of in ("jitter", "loss"))
             jitter_ticks = np.array([float(one.jitter_s * per_s) for one in wires])
             losses = np.array([one.drop_probability for one in wires])
@@ -141,7 +141,7 @@ class Timeline:
 
     def grain(self, window: int | None) -> Grain:
         """Return at which grain the blocks run; see `Simulation` for the parameters."""
-        return grain_of(self.scene, window)
+        return choose_grain(self.scene, window)
 
     def runner(self, component: Component) -> Any:
         """Return what handles the wakes of a block: itself, or what stands in for it."""

@@ -23,7 +23,7 @@ from dsa_des.block.parameters import nested_models
 from dsa_des.block.registry import section_models
 from dsa_des.errors import SceneError, did_you_mean, shown_value
 from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
-from dsa_des.scene.keys import Key, dotted_key, explain_no_item, flat, key_in
+from dsa_des.scene.keys import Key, dotted_key, explain_no_item, flatten_tables, parse_key_path
 from dsa_des.scene.overrides import set_value
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.scene.wiring import MAY_CHANGE as OF_WIRES
@@ -126,7 +126,11 @@ def _read_entry(
     for key in entry:
         if key not in _KEYS:
             scene_file.report((*at, key), f"unknown key of a change{did_you_mean(key, _KEYS)}")
-    times = {key: _seconds(scene_file, (*at, key), entry[key]) for key in _INSTANTS if key in entry}
+    times = {
+        key: _read_instant_s(scene_file, (*at, key), entry[key])
+        for key in _INSTANTS
+        if key in entry
+    }
     if times.keys() not in ({"at_s"}, {"from_s", "to_s"}):
         said = " and ".join(times) or "nothing"
         message = f"says {said}: give at_s, for good, or from_s and to_s, for a while"
@@ -141,10 +145,10 @@ def _read_entry(
         message = 'must be a table of keys and values: set = { "blocks.radar.enabled" = false }'
         scene_file.report((*at, "set"), message, *([] if given is None else [given]))
         return None
-    values = flat(given)
+    values = flatten_tables(given)
     keys = []
     for text, value in values.items():
-        keys.append(key := key_in(scene_file.data, text))
+        keys.append(key := parse_key_path(scene_file.data, text))
         if reason := _explain_fixed(scene_file, key, blocks):
             scene_file.report((*at, "set", text), reason, value)
     if from_s is None or len(scene_file.problems) > before:
@@ -173,7 +177,7 @@ def _key_of_written_scene(scene_file: SceneFile, text: str, key: Key, wires: Seq
     return text
 
 
-def _seconds(scene_file: SceneFile, key: Key, value: Any) -> Fraction | None:
+def _read_instant_s(scene_file: SceneFile, key: Key, value: Any) -> Fraction | None:
     try:
         seconds = parse_rational(value)
         if seconds < 0:
@@ -280,7 +284,7 @@ def stretches_of(
 
     `check` makes a scene of tables; what is wrong with one of them is reported at its change.
     """
-    _judge_late(scene_file, scene.duration_s, changes, scene.notes)
+    _check_late_changes(scene_file, scene.duration_s, changes, scene.notes)
     if scene_file.problems:
         return []
     instants = sorted(
@@ -311,7 +315,7 @@ def stretches_of(
     return stretches
 
 
-def _judge_late(
+def _check_late_changes(
     scene_file: SceneFile,
     duration_s: Fraction | None,
     changes: list[TimedChange],
@@ -353,7 +357,7 @@ def _share_equal_parts(scene: Any, others: list[Any]) -> Any:
     return replace(scene, blocks=blocks, sections=sections)
 
 
-def ticks_of_all(scene_file: SceneFile, scene: Any) -> int:
+def common_ticks_per_s(scene_file: SceneFile, scene: Any) -> int:
     """Return the ticks per second in which all times of a scene and its stretches are whole.
 
     More than 64 bits can count is reported.

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from dsa_des.block.component import Parameters
-from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
-from dsa_des.block.registry import NotImported, UnknownType, find, section_models
-from dsa_des.block.source_file import absolute
-from dsa_des.errors import did_you_mean, nearest
+from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
+from dsa_des.block.registry import NotImported, UnknownType, find_component, section_models
+from dsa_des.block.source_file import absolute_type_name
+from dsa_des.errors import did_you_mean, nearest_name
 from dsa_des.scene.block_table import (
     Block,
     BlockOptions,
@@ -24,12 +24,12 @@ from dsa_des.scene.block_table import (
 from dsa_des.scene.graph import unfed_inputs
 from dsa_des.scene.keys import Key, dotted_key
 from dsa_des.scene.overrides import drop_parameters_of_other_type
-from dsa_des.scene.parameter_errors import explain
+from dsa_des.scene.parameter_errors import explain_validation_error
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.scene.wiring import Wire, block_name_refusal
 from dsa_des.stretches.outage import Outage
 from dsa_des.text.safe_text import shorten
-from dsa_des.time.clock import MAX_TICK, ClockSpec, parse_rational, resolution
+from dsa_des.time.clock import MAX_TICK, ClockSpec, common_ticks_per_second, parse_rational
 
 if TYPE_CHECKING:
     from dsa_des.scene.block_table import Block, ProcessorParameters
@@ -75,7 +75,7 @@ def check_times(
     known = {name: spec for name, spec in clocks.items() if spec is not None}
     for spec in known.values():
         times += spec.exact_times()
-    ticks_per_s = resolution(times)
+    ticks_per_s = common_ticks_per_second(times)
     longest_s = Fraction(MAX_TICK, ticks_per_s)
     if longest_s <= _A_DAY and longest_s <= 1 + (duration_s or _A_DAY):
         shown = (
@@ -116,7 +116,7 @@ def read_clocks(scene: SceneFile, blocks: "Mapping[str, Block]") -> dict[str, Cl
     clocks: dict[str, ClockSpec | None] = {}
     for name, block in blocks.items():
         try:
-            with foreign_code():
+            with wrap_foreign_errors():
                 spec = block.cls.clock_of(block.parameters)
         except ForeignFailure as error:
             message = f"{block.cls.path()} cannot say its clock (clock_of): {error}"
@@ -200,7 +200,7 @@ def check_activity(
                 scene.report(("wires",), message)
                 continue
             try:
-                with foreign_code(TypeError, ValueError):
+                with wrap_foreign_errors(TypeError, ValueError):
                     declared.message.make_initial(wire.holds)
             except (TypeError, ValueError, ForeignFailure) as error:
                 scene.report(("wires",), f"{wire}: holds: {error}")
@@ -266,7 +266,7 @@ def read_table(
     try:
         read = model.model_validate(table)
     except ValidationError as error:
-        scene_file.problems += explain(
+        scene_file.problems += explain_validation_error(
             scene_file, key, what or f"[{dotted_key(key)}]", model, error
         )
         return None
@@ -294,13 +294,13 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
         type_name = table.get("type")
         if not isinstance(type_name, str):
             typed = [one for one, of in tables.items() if isinstance(of, dict) and "type" in of]
-            close = nearest(str(name), typed)
+            close = nearest_name(str(name), typed)
             message = 'needs a type, for example type = "radar.swerling"'
             message += f"; or did you mean the block {close!r}?" if close else ""
             scene_file.report((*key, "type"), message)
             continue
         try:
-            cls = find(type_name, dotted_key((*key, "type")), (scene_file.path.parent,))
+            cls = find_component(type_name, dotted_key((*key, "type")), (scene_file.path.parent,))
         except NotImported:
             continue
         except UnknownType as error:
@@ -319,12 +319,12 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
         extra, given = split_options(table, cls.Parameters)
         given = _restore_sources(scene_file, key, given, cls.Parameters)
         try:
-            with foreign_code(ValidationError):
+            with wrap_foreign_errors(ValidationError):
                 parameters = cls.Parameters.model_validate(given)
                 cls = classes[name] = cls.class_for(parameters)
             options = BlockOptions.model_validate(extra)
         except ValidationError as error:
-            scene_file.problems += explain(
+            scene_file.problems += explain_validation_error(
                 scene_file, key, str(type_name), cls.Parameters, error, BlockOptions.model_fields
             )
             continue
@@ -334,7 +334,7 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
             continue
         check_lookalikes(scene_file, key, given, parameters)
         check_lookalikes(scene_file, key, extra, options)
-        blocks[name] = Block(name, str(absolute(type_name)), cls, parameters, options)
+        blocks[name] = Block(name, str(absolute_type_name(type_name)), cls, parameters, options)
     return classes, blocks
 
 

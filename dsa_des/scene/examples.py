@@ -6,8 +6,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
-from dsa_des.block.shipped_files import files_named, shipped_files
-from dsa_des.errors import Problem, SceneError, nearest
+from dsa_des.block.shipped_files import find_shipped_files, shipped_files
+from dsa_des.errors import Problem, SceneError, nearest_name
 from dsa_des.scene.scene_file import read_scene_file
 
 #: What a shipped file may be; a case asks by studies whether requirements are met.
@@ -31,7 +31,7 @@ def find_input_file(asked: Path | str, kind: Kind | None = None) -> Path:
     # A name that no file system takes is refused where it is opened.
     if not path.is_absolute() and len(path.name) <= 255 and not _has_neighbour(path):
         names = [example.name for example in examples() if kind in (None, example.kind)]
-        close = nearest(path.name.removesuffix(".toml"), names)
+        close = nearest_name(path.name.removesuffix(".toml"), names)
         if close or (len(path.parts) == 1 and not path.suffix):
             message = (
                 f"there is no such file, nor a shipped {kind or 'scene or study'} of that name"
@@ -47,7 +47,7 @@ def _has_neighbour(path: Path) -> bool:
     """Return whether a file (no folder) of nearly this name lies in its folder."""
     try:
         files = [entry.name for entry in os.scandir(path.parent) if entry.is_file()]
-        return nearest(path.name, files) is not None
+        return nearest_name(path.name, files) is not None
     except OSError:
         return False
 
@@ -104,7 +104,7 @@ def examples() -> list[Example]:
 
 def find_example(name: str, kind: Kind | None = None) -> Path | None:
     """Return the file of a shipped scene, study or case; None if there is none of that name."""
-    paths = files_named(name)
+    paths = find_shipped_files(name)
     if len(paths) > 1:
         kinds = {path: read[0] for path in paths if (read := _kind_and_title(path))}
         paths = [path for path, one in kinds.items() if kind in (None, one)]

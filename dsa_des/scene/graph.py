@@ -135,7 +135,7 @@ def cycle_numbers(graph: nx.DiGraph) -> dict[str, int]:
     return looped
 
 
-def depths(graph: nx.DiGraph, first: Collection[str] = ()) -> dict[str, int]:
+def block_depths(graph: nx.DiGraph, first: Collection[str] = ()) -> dict[str, int]:
     """Return the depth of each block: the longest path to it over undelayed edges.
 
     Whatever the blocks in `first` do not depend on is deeper than they are.
@@ -169,7 +169,7 @@ def window_order(
     """
     part = nx.DiGraph(graph.subgraph(windowed))
     part.remove_edges_from(cut)
-    part = with_queues(part, queues or {})
+    part = add_queue_nodes(part, queues or {})
     return _depths(part, first)
 
 
@@ -178,7 +178,7 @@ def queue_key(name: str) -> str:
     return f"processor: {name}"
 
 
-def with_queues(graph: nx.DiGraph, queues: Mapping[str, Collection[str]]) -> nx.DiGraph:
+def add_queue_nodes(graph: nx.DiGraph, queues: Mapping[str, Collection[str]]) -> nx.DiGraph:
     """Return the graph in which what blocks send goes through the queue that they line up in."""
     wired = nx.DiGraph()
     wired.add_nodes_from(graph)

@@ -17,9 +17,9 @@ from dsa_des.scene.keys import (
     dotted_key,
     explain_no_item,
     is_new_item,
+    item_index,
     names_of,
-    place_of,
-    step,
+    step_into_key,
     unquote_key,
 )
 
@@ -139,7 +139,7 @@ class Inheritance:
         for name, value in over.items():
             if isinstance(value, Removals):
                 continue
-            index = place_of(items, name)
+            index = item_index(items, name)
             if index is None and is_new_item(items, name, value):
                 index = len(items)
                 items.append({"name": name})
@@ -161,7 +161,7 @@ class Inheritance:
         removal.known = tuple(map(str, container)) if isinstance(container, dict) else ()
         while isinstance(container, dict | list):
             index: Any
-            index, _, rest = step(container, rest)
+            index, _, rest = step_into_key(container, rest)
             if index is None or (isinstance(container, dict) and index not in container):
                 return
             if not rest:

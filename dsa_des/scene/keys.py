@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from dsa_des.errors import did_you_mean, nearest
+from dsa_des.errors import did_you_mean, nearest_name
 
 Key = tuple[str | int, ...]
 
@@ -28,7 +28,7 @@ def unquote_key(text: str) -> str:
     )
 
 
-def flat(
+def flatten_tables(
     tables: Mapping[str, Any],
     is_value: Callable[[Any], bool] = lambda value: not isinstance(value, dict),
     prefix: str = "",
@@ -39,11 +39,11 @@ def flat(
         if is_value(value):
             values[f"{prefix}{name}"] = value
         else:
-            values |= flat(value, is_value, f"{prefix}{name}.")
+            values |= flatten_tables(value, is_value, f"{prefix}{name}.")
     return values
 
 
-def step(container: Any, rest: str) -> tuple[str | int | None, str, str]:
+def step_into_key(container: Any, rest: str) -> tuple[str | int | None, str, str]:
     """Return the next step into a table or list, as it was written, and what is left of the key.
 
     A name that is already there is found whole, dots and brackets included: a study has axes of
@@ -51,13 +51,13 @@ def step(container: Any, rest: str) -> tuple[str | int | None, str, str]:
     item; `explain_no_item` says what it has.
     """
     if isinstance(container, list):
-        return _item(container, rest)
+        return _step_into_list(container, rest)
     part = _longest_match([str(name) for name in container], rest)
     part = rest.partition(".")[0] if part is None else part
     return part, part, rest[len(part) :].removeprefix(".")
 
 
-def _item(items: list[Any], rest: str) -> tuple[int | None, str, str]:
+def _step_into_list(items: list[Any], rest: str) -> tuple[int | None, str, str]:
     bracket = rest.startswith("[")
     names = names_of(items)
     inside = rest[1:] if bracket else rest
@@ -68,14 +68,14 @@ def _item(items: list[Any], rest: str) -> tuple[int | None, str, str]:
         part = part.removesuffix("]") if bracket else part
     tail = inside[len(part) :]
     tail = (tail.removeprefix("]") if bracket else tail).removeprefix(".")
-    return place_of(items, part), part, tail
+    return item_index(items, part), part, tail
 
 
-def place_of(items: list[Any], part: str) -> int | None:
+def item_index(items: list[Any], part: str) -> int | None:
     """Return which item a number or a name means; None where none does, or several do."""
     if INDEX.fullmatch(part):
         return int(part) if int(part) < len(items) else None
-    places = [number for number, item in enumerate(items) if _name(item) == part]
+    places = [number for number, item in enumerate(items) if _item_name(item) == part]
     return places[0] if len(places) == 1 else None
 
 
@@ -100,12 +100,12 @@ def is_new_item(items: list[Any], name: str, value: Any) -> bool:
     if not all(isinstance(item, dict) for item in items):
         return False
     common = set.intersection(*map(set, items)) if items else set()
-    return nearest(name, names_of(items)) is None or common <= {"name", *value}
+    return nearest_name(name, names_of(items)) is None or common <= {"name", *value}
 
 
 def names_of(items: list[Any]) -> list[str]:
     """Return the names of the tables of a list that have one."""
-    return [name for item in items if (name := _name(item))]
+    return [name for item in items if (name := _item_name(item))]
 
 
 def name_items(tables: Any, text: str) -> str:
@@ -115,13 +115,17 @@ def name_items(tables: Any, text: str) -> str:
     """
     words: list[str] = []
     named = False
-    for part in key_in(tables, text):
+    for part in parse_key_path(tables, text):
         inside = isinstance(part, int) and isinstance(tables, list) and part < len(tables)
         if isinstance(part, int):
             kind = words.pop() if words else ""
             ends = _blocks_of_wire(tables[part]) if inside else None
             name = (
-                f"from {ends[0]} to {ends[-1]}:" if ends else _name(tables[part]) if inside else ""
+                f"from {ends[0]} to {ends[-1]}:"
+                if ends
+                else _item_name(tables[part])
+                if inside
+                else ""
             )
             words.append(f"{kind.removesuffix('s')} {name or part + 1}".strip())
             named = True
@@ -143,7 +147,7 @@ def _blocks_of_wire(item: Any) -> list[str]:
     return [end.partition(".")[0].strip() for end in ends]
 
 
-def _name(item: Any) -> str:
+def _item_name(item: Any) -> str:
     name = item.get("name") if isinstance(item, dict) else getattr(item, "name", None)
     return str(name) if isinstance(name, str) else ""
 
@@ -153,7 +157,7 @@ def _longest_match(names: list[str], rest: str) -> str | None:
     return max(there, key=len, default=None)
 
 
-def key_in(tables: Any, text: str) -> Key:
+def parse_key_path(tables: Any, text: str) -> Key:
     """Return the key path that a dotted key means in some tables, items by their number.
 
     What the tables do not hold stays as it was written.
@@ -161,7 +165,7 @@ def key_in(tables: Any, text: str) -> Key:
     path: list[str | int] = []
     rest = unquote_key(text)
     while rest:
-        index, part, rest = step(tables, rest)
+        index, part, rest = step_into_key(tables, rest)
         path.append(part if index is None else index)
         inside = index is not None if isinstance(tables, list) else index in tables
         tables = tables[index] if inside else {}

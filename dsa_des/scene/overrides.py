@@ -14,11 +14,18 @@ from typing import Any
 
 from dsa_des.block.component import Component, SourcedText, scene_number
 from dsa_des.block.entry_points import COMPONENTS
-from dsa_des.block.registry import NotImported, UnknownType, add_source, find, type_text
+from dsa_des.block.registry import NotImported, UnknownType, add_source, find_component, type_text
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.files.toml_files import DEEPEST, NotToml, TomlError, parse_toml
 from dsa_des.scene.block_table import BlockOptions
-from dsa_des.scene.keys import Key, dotted_key, explain_no_item, is_new_item, step, unquote_key
+from dsa_des.scene.keys import (
+    Key,
+    dotted_key,
+    explain_no_item,
+    is_new_item,
+    step_into_key,
+    unquote_key,
+)
 from dsa_des.scene.scene_file import COMMAND_LINE, SceneFile, read_scene_tables
 
 #: A dotted key and its value, or ``swap.BLOCK`` and a type.
@@ -91,7 +98,7 @@ def read_changes(
     return changes, problems + wrong
 
 
-def read_program(values: Mapping[Any, Any], source: str) -> list[Change]:
+def read_python_changes(values: Mapping[Any, Any], source: str) -> list[Change]:
     """Return what a program changes by `IN_SET` or `IN_SWAP`; SceneError with all that is wrong."""
     changes: list[Change] = []
     problems: list[Problem] = []
@@ -161,7 +168,7 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     key: list[str | int] = []
     rest = unquote_key(text)
     while True:
-        index, part, rest = step(container, rest)
+        index, part, rest = step_into_key(container, rest)
         if index is None and not rest and is_new_item(container, part, value):
             index, value = len(container), {"name": part, **value}
             container.append(value)
@@ -216,7 +223,7 @@ def swap_type(
         scene.problems.append(Problem(source, option or name, message, name))
         return []
     try:
-        cls = find(type_name, dotted_key(_type_key(name)), (scene.path.parent,))
+        cls = find_component(type_name, dotted_key(_type_key(name)), (scene.path.parent,))
     except NotImported:  # what it would drop is not known: nothing is dropped
         blocks[name]["type"] = type_name
         scene.sources[_type_key(name)] = source
@@ -250,7 +257,7 @@ def drop_parameters_of_other_type(scene: SceneFile, name: str, cls: type[Compone
                 f"{dotted_key(key)} of {scene.source_of(key)} was dropped: it is a parameter of "
                 f"{old}, and {scene.source_of(_type_key(name))} makes {name} a {block['type']}"
             )
-        elif mine and (meanings := _other_meaning(scene, old, cls, str(parameter))):
+        elif mine and (meanings := _differing_descriptions(scene, old, cls, str(parameter))):
             notes.append(
                 f"{dotted_key(key)} of {scene.source_of(key)} is kept, though it means "
                 "another thing: "
@@ -260,14 +267,14 @@ def drop_parameters_of_other_type(scene: SceneFile, name: str, cls: type[Compone
     return notes
 
 
-def _other_meaning(
+def _differing_descriptions(
     scene: SceneFile, old: str, cls: type[Component], parameter: str
 ) -> tuple[str, str] | None:
     """Return how two types describe a parameter of one name, where that begins differently."""
     if ":" in old:  # nothing foreign is imported for a note
         return None
     try:
-        fields = find(old, "", (scene.path.parent,)).Parameters.model_fields
+        fields = find_component(old, "", (scene.path.parent,)).Parameters.model_fields
     except UnknownType:
         return None
     if parameter not in fields or parameter not in cls.Parameters.model_fields:

@@ -12,14 +12,14 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import SchemaValidator
 
 from dsa_des.block.component import Parameters, scene_number
-from dsa_des.errors import Disagreements, Lines, Problem, did_you_mean, nearest
-from dsa_des.scene.keys import Key, key_in
+from dsa_des.errors import Disagreements, Lines, Problem, did_you_mean, nearest_name
+from dsa_des.scene.keys import Key, parse_key_path
 from dsa_des.scene.scene_file import SceneFile
 
 
 def all_disagreements(model: type[BaseModel], item: Any) -> list[str]:
     """Return what every validator of a whole model says of a table that one of them refused."""
-    texts = _texts(item.get("ctx", {}).get("error")) or [item["msg"]]
+    texts = _error_texts(item.get("ctx", {}).get("error")) or [item["msg"]]
     try:
         table = SchemaValidator(_fields_schema(model.__pydantic_core_schema__)).validate_python(
             item["input"]
@@ -62,11 +62,13 @@ def _validator_messages(model: type[BaseModel], table: Any) -> list[str]:
         except Exception as error:
             # One that reads refused keys may fail in any way; one that means a key names it.
             if isinstance(error, ValueError):
-                texts += [text for text in _texts(error) if names & set(re.findall(r"\w+", text))]
+                texts += [
+                    text for text in _error_texts(error) if names & set(re.findall(r"\w+", text))
+                ]
     return texts
 
 
-def _texts(error: Any) -> list[str]:
+def _error_texts(error: Any) -> list[str]:
     if isinstance(error, Disagreements):
         return list(error.texts)
     return [] if error is None else [str(error)]
@@ -92,7 +94,7 @@ def _relax_fields(schema: Any, refused: set[str]) -> Any:
 _MUST = "must be "
 
 
-def explain(
+def explain_validation_error(
     scene_file: SceneFile,
     key: Key,
     what: str,
@@ -108,13 +110,13 @@ def explain(
     problems = []
     refused: set[str] = set()
     for item in error.errors(include_url=False):
-        refused.update(_names_meant(model, item))
+        refused.update(_key_and_nearest_names(model, item))
         at = _existing_path(scene_file, key, item["loc"])
         if item["type"] == "extra_forbidden":
             *inside, name = map(str, item["loc"])
             instead = None if inside else getattr(model, "former", {}).get(name)
             allowed = _sibling_names(model, item["loc"])
-            close = nearest(name, [*allowed, *(() if inside else beside)])
+            close = nearest_name(name, [*allowed, *(() if inside else beside)])
             hint = f"; {instead}" if instead else did_you_mean(name, [close] if close else allowed)
             kind = "parameter" if key else "key"
             problems.append(scene_file.problem(at, f"unknown {kind} of {what}{hint}"))
@@ -129,7 +131,7 @@ def explain(
             problems.append(_kind_problem(scene_file, at, item["ctx"]))
         elif item["type"] == "missing":
             given = [str(k) for k in item["input"]] if isinstance(item["input"], dict) else []
-            close = nearest(str(item["loc"][-1]), given)
+            close = nearest_name(str(item["loc"][-1]), given)
             hint = f" ({close!r} is given)" if close else ""
             problems.append(scene_file.problem(at, f"is required by {what} and missing{hint}"))
         elif not item["loc"] and item["type"] == "value_error":
@@ -151,7 +153,7 @@ def explain(
             message = re.sub("^String should have at least 1 .*", "must not be empty", message)
             if item["type"] == "literal_error":
                 names = re.findall(r"'([^']*)'", item["ctx"]["expected"])
-                close = nearest(str(item["input"]), names)
+                close = nearest_name(str(item["input"]), names)
                 message += f"; did you mean {close!r}?" if close else ""
             problems.append(_refusal_problem(scene_file, at, message, item["input"]))
     given = _value_at(scene_file, key)
@@ -161,14 +163,14 @@ def explain(
     return _merge_by_key(problems)
 
 
-def _names_meant(model: Any, item: Any) -> list[str]:
+def _key_and_nearest_names(model: Any, item: Any) -> list[str]:
     """Return the key that an error is about, and the nearest known ones of an unknown key."""
     if not item["loc"]:
         return []
     name = str(item["loc"][0])
     if name in model.model_fields:
         return [name]
-    close = nearest(name, list(model.model_fields))
+    close = nearest_name(name, list(model.model_fields))
     return [name, close] if close else [name]
 
 
@@ -205,7 +207,7 @@ def _kind_problem(scene_file: SceneFile, at: Key, context: Any) -> Problem:
     if "tag" not in context:
         return scene_file.problem(at, "is required and missing")
     allowed = re.findall(r"'([^']*)'", context["expected_tags"])
-    close = nearest(context["tag"], allowed)
+    close = nearest_name(context["tag"], allowed)
     hint = f"; did you mean {close!r}?" if close else ""
     return scene_file.problem(at, f"must be one of {', '.join(allowed)}{hint}", context["tag"])
 
@@ -283,7 +285,7 @@ def _nested_model(annotation: Any) -> Any:
     return None
 
 
-def refusal(file: SceneFile, block: str, parameters: Parameters, text: str) -> Problem:
+def block_refusal(file: SceneFile, block: str, parameters: Parameters, text: str) -> Problem:
     """Return what a block refuses at its start, at the key that its text begins with, if any.
 
     Texts begin with keys, ``ownship: alt_m is 2e6: ...``, or with a file that a key names.
@@ -294,7 +296,7 @@ def refusal(file: SceneFile, block: str, parameters: Parameters, text: str) -> P
             return file.problem((*key, parameter), text)
     value: Any = file.data["blocks"][block]
     while begins := re.match(r"([\w.\[\]]+)(?:: | is \S+: )", text):
-        inner = key_in(value, begins[1])
+        inner = parse_key_path(value, begins[1])
         try:
             for part in inner:
                 value = value[part]

@@ -6,7 +6,7 @@ from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.scene import Scene
 
 
-def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, str]:
+def platform_by_block(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, str]:
     """Return what carries each block, by name: what its table says, or what carries its feeders.
 
     `moved` is what some blocks move (`Component.platforms`); these are on none themselves. A block
@@ -17,8 +17,8 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
     known = [name for names in moved.values() for name in names]
     if len(known) < 2 and all(one.options.platform is None for one in scene.blocks.values()):
         return dict.fromkeys(sorted(scene.blocks.keys() - moved.keys()), next(iter(known), ""))
-    near = {name: _feeding(scene, name, between=False) for name in scene.blocks}
-    far = {name: _feeding(scene, name, between=True) for name in scene.blocks}
+    near = {name: _feeding_blocks(scene, name, between=False) for name in scene.blocks}
+    far = {name: _feeding_blocks(scene, name, between=True) for name in scene.blocks}
     carrying: dict[str, str] = {}
     problems: list[Problem] = []
     for name, block in scene.blocks.items():
@@ -40,9 +40,9 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
         carrying |= found or dict.fromkeys(left, next(iter(known), ""))
         left = [name for name in left if name not in carrying]
     for name in sorted(carrying):
-        mine, feeders = carrying[name], _carried(near[name], carrying)
+        mine, feeders = carrying[name], _carriers_of_blocks(near[name], carrying)
         is_settled = bool(feeders) or scene.blocks[name].options.platform is not None
-        feeders = feeders if is_settled else _carried(far[name], carrying)
+        feeders = feeders if is_settled else _carriers_of_blocks(far[name], carrying)
         for other in sorted(feeders.keys() - {mine}):
             by = f"{feeders[mine]} feeds it" if mine in feeders else "its key platform says"
             how = "a block looks from one place; give each platform one of its own"
@@ -60,7 +60,7 @@ def platforms_of(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, 
     return carrying
 
 
-def _feeding(scene: Scene, name: str, *, between: bool) -> list[str]:
+def _feeding_blocks(scene: Scene, name: str, *, between: bool) -> list[str]:
     """Return the blocks that feed one, over inputs between platforms or over the others."""
     inputs = scene.blocks[name].cls.inputs
     return [
@@ -74,11 +74,11 @@ def _carriers_by_feeders(
     names: Sequence[str], feeding: Mapping[str, Sequence[str]], carrying: Mapping[str, str]
 ) -> dict[str, str]:
     """Return what carries those of some blocks of which a feeder is known."""
-    carried = {name: _carried(feeding[name], carrying) for name in names}
+    carried = {name: _carriers_of_blocks(feeding[name], carrying) for name in names}
     return {name: min(feeders) for name, feeders in carried.items() if feeders}
 
 
-def _carried(sources: Sequence[str], carrying: Mapping[str, str]) -> dict[str, str]:
+def _carriers_of_blocks(sources: Sequence[str], carrying: Mapping[str, str]) -> dict[str, str]:
     """Return what carries some blocks, with the first of them on each."""
     found: dict[str, str] = {}
     for source in sources:

@@ -19,9 +19,9 @@ from dsa_des.scene.changes import (
     CHANGES,
     Stretch,
     TimedChange,
+    common_ticks_per_s,
     read_timed_changes,
     stretches_of,
-    ticks_of_all,
 )
 from dsa_des.scene.checks import (
     check_activity,
@@ -44,12 +44,12 @@ from dsa_des.scene.overrides import (
     Change,
     apply_changes,
     read_changes,
-    read_program,
+    read_python_changes,
     read_sets,
 )
-from dsa_des.scene.parameter_errors import refusal
+from dsa_des.scene.parameter_errors import block_refusal
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
-from dsa_des.scene.wiring import Wire, read_wires, with_latencies
+from dsa_des.scene.wiring import Wire, add_block_latencies, read_wires
 from dsa_des.stretches.outage import Outage
 from dsa_des.text.safe_text import printable, shorten
 from dsa_des.time.randomness import Streams
@@ -196,7 +196,7 @@ class Scene:
         return self._change({**(types or {}), **more}, IN_SWAP)
 
     def _change(self, values: Mapping[str, Any], source: str) -> "Scene":
-        changes = read_program(values, source)
+        changes = read_python_changes(values, source)
         file, before = self.origin
         return changed_tables(file, (*before, *changes))
 
@@ -219,7 +219,7 @@ class Scene:
         """Return what a block refuses at its start, at the key that its text begins with."""
         if self._tables is None:
             return self.problem(dotted_key(("blocks", name)), text)
-        return refusal(self._tables, name, self.blocks[name].parameters, text)
+        return block_refusal(self._tables, name, self.blocks[name].parameters, text)
 
     @property
     def queues(self) -> dict[str, list[str]]:
@@ -332,7 +332,7 @@ def check_scene(scene_file: SceneFile) -> Scene:
     classes, blocks = read_blocks(scene_file, notes)
     unsure: set[str] = set()
     processors = read_processors(scene_file, blocks)
-    wires = with_latencies(
+    wires = add_block_latencies(
         read_wires(scene_file, classes, unsure),
         {name: block.options for name, block in blocks.items()},
     )
@@ -352,7 +352,7 @@ def check_scene(scene_file: SceneFile) -> Scene:
     if CHANGES in data:
         scene.changes = read_timed_changes(scene_file, classes, wires)
         scene.stretches = stretches_of(scene_file, scene, scene.changes, check_scene)
-        scene.ticks_per_s = ticks_of_all(scene_file, scene)
+        scene.ticks_per_s = common_ticks_per_s(scene_file, scene)
     if scene_file.problems and len(sections) == len(section_models()):
         scene_file.problems += _refusals_of_blocks(scene)
     scene_file.refuse()

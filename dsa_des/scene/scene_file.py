@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.registry import add_source
-from dsa_des.block.shipped_files import files_named, shipped_files
+from dsa_des.block.shipped_files import find_shipped_files, shipped_files
 from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.files.input_files import (
     LARGEST_TOML_BYTES,
@@ -204,7 +204,7 @@ class _Reader:
         if "\0" in base or os.path.lexists(beside):
             return beside
         try:
-            shipped = files_named(base)
+            shipped = find_shipped_files(base)
         except UsageError as error:
             raise SceneError([Problem(str(path), "extends", str(error))]) from None
         return shipped[0] if len(shipped) == 1 else beside
@@ -238,17 +238,17 @@ def merge(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 def _similar_file(path: Path, shipped: bool) -> str:
     """Return which file was meant: one beside, or else a shipped one where that would do."""
-    from dsa_des.errors import nearest
+    from dsa_des.errors import nearest_name
 
     missing, names = "", []
     try:
         names = [entry.name for entry in path.parent.iterdir() if is_regular_file(entry)]
     except OSError:
         missing = f" (there is no folder {shorten(str(path.parent), 300)})"
-    if close := nearest(path.name, names):
+    if close := nearest_name(path.name, names):
         return f"; did you mean {path.parent / close}?"
     known = [name for index, _ in shipped_files() for name in (index.name, str(index))]
-    if shipped and (close := nearest(path.name.removesuffix(".toml"), known)):
+    if shipped and (close := nearest_name(path.name.removesuffix(".toml"), known)):
         return f"; did you mean the shipped {close!r}?"
     return missing
 

@@ -18,7 +18,7 @@ from itertools import pairwise
 from typing import Any
 
 from dsa_des.block.component import Component, scene_number
-from dsa_des.errors import Problem, did_you_mean, nearest
+from dsa_des.errors import Problem, did_you_mean, nearest_name
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.keys import Key
 from dsa_des.scene.scene_file import SceneFile
@@ -112,7 +112,7 @@ def read_wires(
     for position, entry in enumerate(entries):
         key: Key = ("wires", position)
         try:
-            hops = _hops(entry)
+            hops = _read_hops(entry)
         except _WireError as error:
             scene.report((*key, *error.key), str(error), *error.value)
             unsure.update(classes)  # its target is unknown
@@ -130,9 +130,9 @@ def read_wires(
                 wires.append(wire)
             else:
                 name = target.partition(".")[0]
-                unsure.add(name if name in classes else nearest(name, classes) or name)
+                unsure.add(name if name in classes else nearest_name(name, classes) or name)
         scene.problems += of_wire
-    _two_writers(scene, wires, classes)
+    _report_double_writers(scene, wires, classes)
     return sorted(wires, key=lambda w: (w.target, w.input, w.source, w.output))
 
 
@@ -155,7 +155,7 @@ class _WireError(Exception):
         super().__init__(message)
 
 
-def _hops(entry: Any) -> list[tuple[str, str, dict[str, Any]]]:
+def _read_hops(entry: Any) -> list[tuple[str, str, dict[str, Any]]]:
     if isinstance(entry, str):
         ends = [end.strip() for end in entry.split("->")]
         if len(ends) < 2 or not all(_END.fullmatch(end) for end in ends):
@@ -172,10 +172,10 @@ def _hops(entry: Any) -> list[tuple[str, str, dict[str, Any]]]:
     for name, end in (("from", source), ("to", target)):
         if not isinstance(end, str) or not _END.fullmatch(end.strip()):
             raise _WireError(f'needs {name} = "block" or "block.port"', entry)
-    return [(str(source).strip(), str(target).strip(), _options(entry))]
+    return [(str(source).strip(), str(target).strip(), _read_wire_options(entry))]
 
 
-def _options(entry: Mapping[str, Any]) -> dict[str, Any]:
+def _read_wire_options(entry: Mapping[str, Any]) -> dict[str, Any]:
     options: dict[str, Any] = {}
     if "delay" in entry and "delay_s" in entry:
         raise _WireError("give delay or delay_s, not both", dict(entry))
@@ -189,7 +189,7 @@ def _options(entry: Mapping[str, Any]) -> dict[str, Any]:
         options["delay_scans"] = int(match[1])
     for key in ("delay_s", "jitter_s"):
         if key in entry:
-            options[key] = _seconds(key, entry[key])
+            options[key] = _read_seconds(key, entry[key])
     if "drop_probability" in entry:
         share = entry["drop_probability"]
         if isinstance(share, bool) or not isinstance(share, int | float) or not 0 <= share <= 1:
@@ -204,7 +204,7 @@ def _options(entry: Mapping[str, Any]) -> dict[str, Any]:
     return options
 
 
-def _seconds(key: str, value: Any) -> Fraction:
+def _read_seconds(key: str, value: Any) -> Fraction:
     try:
         seconds = parse_rational(value)
     except ValueError as error:
@@ -252,7 +252,7 @@ def _connect(
     )
 
 
-def _two_writers(
+def _report_double_writers(
     scene: SceneFile,
     wires: list[Wire],
     classes: Mapping[str, type[Component]],
@@ -272,7 +272,7 @@ def _two_writers(
             scene.report(("wires",), message)
 
 
-def with_latencies(wires: list[Wire], options: Mapping[str, BlockOptions]) -> list[Wire]:
+def add_block_latencies(wires: list[Wire], options: Mapping[str, BlockOptions]) -> list[Wire]:
     """Return the wires with what their sending blocks add to the delay."""
     return [
         replace(

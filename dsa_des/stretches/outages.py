@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run
+from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
@@ -126,7 +126,7 @@ class Outages:
 
 def _is_in_outage(edges: RunTicks, instants: RunTicks) -> BoolArray:
     """Return which instants lie in an outage; edges are failures and repairs, in turns."""
-    last = last_of_run(edges, instants)
+    last = last_position_in_run(edges, instants)
     there = (last >= 0) & (edges.run[last] == instants.run)
     # Failures are even, as every run has as many.
     out: BoolArray = there & (last % 2 == 0)

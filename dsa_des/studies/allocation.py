@@ -100,7 +100,7 @@ class Allocation:
 
     def _chances(self, runs: ForeseenRuns) -> FloatArray:
         terms = model_terms(self._scale_geometry(runs.geometry), runs.nominal)
-        return chances(terms, runs, self.coefficients)
+        return event_chances(terms, runs, self.coefficients)
 
     def _scale_geometry(self, geometry: FloatArray) -> FloatArray:
         away = geometry - self.middle[:, None]
@@ -127,13 +127,13 @@ def model_terms(scaled: FloatArray, nominal: FloatArray) -> FloatArray:
     return np.concatenate([within, within**2 - 1.0, nominal])
 
 
-def chances(terms: FloatArray, runs: ForeseenRuns, coefficients: FloatArray) -> FloatArray:
+def event_chances(terms: FloatArray, runs: ForeseenRuns, coefficients: FloatArray) -> FloatArray:
     """Return the chance of each event by the logistic models, (events, runs)."""
-    offset = _offset(runs.expected)
+    offset = _logit_offset(runs.expected)
     without, having = (
         np.array(
             [
-                _sum_terms(c[k], _design(terms, of))
+                _sum_terms(c[k], _design_matrix(terms, of))
                 for c, of in zip(coefficients, offset, strict=True)
             ]
         )
@@ -144,7 +144,7 @@ def chances(terms: FloatArray, runs: ForeseenRuns, coefficients: FloatArray) -> 
     return result
 
 
-def learn(
+def learn_allocation(
     runs: ForeseenRuns, happened: FloatArray, stands_for: FloatArray, least: float = LEAST
 ) -> Allocation:
     """Return the plan for further runs of a cell, from those that are known, flown or not.
@@ -174,12 +174,12 @@ def learn(
             weight = stands_for[some] / stands_for[some].mean() if some.any() else np.empty(0)
             fitted[event, having] = fit_chances(terms[:, some], e[some], m[some], weight)
     predicted = np.where(flown, happened, 0.0).sum(axis=1) >= PREDICTED_FROM
-    precision, size = best_size(runs, chances(terms, runs, fitted), predicted, least)
+    precision, size = best_sample_size(runs, event_chances(terms, runs, fitted), predicted, least)
     plan = Allocation(middle, spread, fitted, precision, size, predicted, least)
     return replace(plan, share=float(plan.probabilities(runs).mean()))
 
 
-def best_size(
+def best_sample_size(
     runs: ForeseenRuns, chance: FloatArray, predicted: BoolArray, least: float
 ) -> tuple[FloatArray, float]:
     """Return 1/V of each event, and the size of π with the least variance times cost."""
@@ -217,8 +217,8 @@ def fit_chances(
     coefficients (level, belief, slopes); with no event at all it stays near what was expected. A
     belief of 0 takes the logit of that as it is, one of -1 not at all.
     """
-    offset = _offset(expected)
-    design = _design(terms, offset)
+    offset = _logit_offset(expected)
+    design = _design_matrix(terms, offset)
     sd = np.full(len(design), _SLOPE_SD)
     sd[:2] = _LEVEL_SD, _BELIEF_SD
     prior, at = np.diag(1.0 / sd**2), np.zeros(len(design))
@@ -250,11 +250,11 @@ def _sum_terms(factors: FloatArray, terms: FloatArray) -> FloatArray:
     return result
 
 
-def _design(terms: FloatArray, offset: FloatArray) -> FloatArray:
+def _design_matrix(terms: FloatArray, offset: FloatArray) -> FloatArray:
     return np.concatenate([np.ones((1, len(offset))), offset[np.newaxis], terms])
 
 
-def _offset(expected: FloatArray) -> FloatArray:
+def _logit_offset(expected: FloatArray) -> FloatArray:
     p = np.clip(expected, _LEAST_CHANCE, 1.0 - _LEAST_CHANCE)
     result: FloatArray = np.log(p / (1.0 - p))
     return result

@@ -17,11 +17,11 @@ from operator import itemgetter
 import numpy as np
 
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.replicas.changed_scene import scene_of
+from dsa_des.replicas.changed_scene import replica_scene
 from dsa_des.replicas.lock_step_size import RunSize
 from dsa_des.replicas.replicas import lock_step_refusal
-from dsa_des.running.loops import opened_loops
-from dsa_des.studies.chunk import Done, crashed_run, join_pieces
+from dsa_des.running.loops import edges_opening_loops
+from dsa_des.studies.chunk import ChunkResult, crashed_run, join_pieces
 from dsa_des.studies.study import Chunk, Study
 
 #: How often a chunk may lose its process before it is cut.
@@ -50,7 +50,7 @@ class Attempts:
         self._only = False
         #: Of chunks that were cut: how many runs are missing, and what is there.
         self._missing: dict[str, int] = {}
-        self._there: dict[str, list[Done]] = {}
+        self._there: dict[str, list[ChunkResult]] = {}
 
     def next_piece(self) -> Piece | None:
         """Return what to run next; None if nothing may be begun now."""
@@ -71,12 +71,12 @@ class Attempts:
         self._check_ended()
         self._again.append(piece)
 
-    def finish(self, piece: Piece, results: Iterable[Done]) -> list[Done]:
+    def finish(self, piece: Piece, results: Iterable[ChunkResult]) -> list[ChunkResult]:
         """Take the results of a piece; return those of chunks of which all is there."""
         self._check_ended()
         return [whole for one in results if (whole := self._collect(one)) is not None]
 
-    def take_back(self, piece: Piece) -> list[Done]:
+    def take_back(self, piece: Piece) -> list[ChunkResult]:
         """Take back a piece whose process died; return its chunk's result if that was the last."""
         self._check_ended()
         chunk, losses = piece.chunks[0], piece.losses + 1
@@ -92,7 +92,7 @@ class Attempts:
         else:
             self._missing.setdefault(chunk.name, len(chunk))
             # A single run begins to count anew; halves were warned.
-            for half in halves(chunk):
+            for half in split_chunk(chunk):
                 self._again.append(Piece((half,), 0 if len(half) == 1 else losses - 1))
         return []
 
@@ -100,7 +100,7 @@ class Attempts:
         self._running -= 1
         self._only = False
 
-    def _collect(self, result: Done) -> Done | None:
+    def _collect(self, result: ChunkResult) -> ChunkResult | None:
         name = result.name
         if name not in self._missing:
             return result
@@ -122,7 +122,7 @@ def run_together(
     most = _lock_step_size(study, chunks[0].runs[0][0])
     total = sum(chunk.expected_flown for chunk in chunks)
     per = total / (workers * math.ceil(total / (workers * most))) if most else 0.0
-    for cell_goes_on in _chains(chunks):
+    for cell_goes_on in _consecutive_chunks(chunks):
         flown = np.array([chunk.expected_flown for chunk in cell_goes_on])
         count = math.ceil(flown.sum() / per - 1e-9) if most else len(flown)
         of = ((np.cumsum(flown) - 0.5 * flown) * (count / flown.sum())).astype(int).tolist()
@@ -130,7 +130,7 @@ def run_together(
             yield tuple(chunk for _, chunk in mine)
 
 
-def _chains(chunks: Iterable[Chunk]) -> Iterator[list[Chunk]]:
+def _consecutive_chunks(chunks: Iterable[Chunk]) -> Iterator[list[Chunk]]:
     """Give consecutive chunks each of which begins in the cell that the one before ends in."""
     chain: list[Chunk] = []
     for chunk in chunks:
@@ -148,16 +148,16 @@ def _lock_step_size(study: Study, cell: int) -> int:
     """
     try:
         scene = study.scene(cell)
-        if not opened_loops(scene) or lock_step_refusal(
+        if not edges_opening_loops(scene) or lock_step_refusal(
             scene, [study.replica(n, cell) for n in (0, 1)]
         ):
             return 0
-        return RunSize.of(scene_of(scene, study.replica(0, cell)), {}).most
+        return RunSize.of(replica_scene(scene, study.replica(0, cell)), {}).most
     except (SceneError, BlockFailure):  # its rows say why
         return 0
 
 
-def halves(chunk: Chunk) -> tuple[Chunk, Chunk]:
+def split_chunk(chunk: Chunk) -> tuple[Chunk, Chunk]:
     """Return the first and the second half of a chunk's runs."""
     left = len(chunk) // 2
     first: list[tuple[int, int, int]] = []

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.component import scene_number
-from dsa_des.block.source_file import absolute
+from dsa_des.block.source_file import absolute_type_name
 from dsa_des.errors import did_you_mean
-from dsa_des.scene.keys import flat
+from dsa_des.scene.keys import flatten_tables
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import parse_rational
 
@@ -54,7 +54,7 @@ class Axis:
 
 def flatten_axes(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Return dotted key → list or table of every axis; nested tables are keys of the scene."""
-    return flat(
+    return flatten_tables(
         tables, lambda v: not isinstance(v, dict) or not v or bool(set(v) & set(_SPEC_KEYS))
     )
 
@@ -72,26 +72,26 @@ def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
             if name not in _SPEC_KEYS:
                 raise ValueError(f"unknown key {name!r} of an axis{did_you_mean(name, _SPEC_KEYS)}")
         if "files" in spec:
-            return _files(key, spec)
+            return _file_axis(key, spec)
         if "set" in spec:
             return _linked_axis(key, spec)
         if "beat_with" in spec:
-            values = _phases(key, spec, scene)
+            values = _phase_offsets(key, spec, scene)
         elif "values" in spec:
             values = spec["values"]
         else:
-            values = _range(spec)
+            values = _range_values(spec)
     if not isinstance(values, list) or not values:
         raise ValueError("is empty: an axis needs at least one value")
-    _refuse_many(len(values))
+    _refuse_too_many(len(values))
     if key.startswith(SWAP):
-        return _swap(key, values, scene)
-    labels = tuple(label_of(value) for value in values)
-    _refuse_twice(labels)
+        return _swap_axis(key, values, scene)
+    labels = tuple(axis_value_label(value) for value in values)
+    _refuse_duplicates(labels)
     return Axis(key, labels, tuple(((key, value),) for value in values), ((),) * len(values))
 
 
-def label_of(value: Any) -> Any:
+def axis_value_label(value: Any) -> Any:
     """Return what a study calls a value of an axis: a flag and a list are texts."""
     if isinstance(value, bool):
         return str(value).lower()
@@ -104,34 +104,34 @@ def label_of(value: Any) -> Any:
     return value if isinstance(value, int | float) else str(value)
 
 
-def _refuse_twice(labels: tuple[Any, ...]) -> None:
+def _refuse_duplicates(labels: tuple[Any, ...]) -> None:
     label, count = Counter(labels).most_common(1)[0]
     if count > 1:
         raise ValueError(f"holds {label!r} more than once")
 
 
-def _refuse_many(count: int, most: int = _MOST_VALUES) -> None:
+def _refuse_too_many(count: int, most: int = _MOST_VALUES) -> None:
     if count > most:
         raise ValueError(f"has {count:,} values; at most {most:,} are allowed")
 
 
-def _swap(key: str, values: list[Any], scene: Scene) -> Axis:
+def _swap_axis(key: str, values: list[Any], scene: Scene) -> Axis:
     block = key.removeprefix(SWAP)
     if block not in scene.blocks:
         raise ValueError(f"the scene has no block {block!r}{did_you_mean(block, scene.blocks)}")
     if not all(isinstance(value, str) for value in values):
         raise ValueError("a swap takes types of blocks, as texts")
     labels = tuple(str(value) for value in values)
-    _refuse_twice(labels)
+    _refuse_duplicates(labels)
     return Axis(
         key,
         labels,
         ((),) * len(labels),
-        tuple(((block, absolute(value)),) for value in values),
+        tuple(((block, absolute_type_name(value)),) for value in values),
     )
 
 
-def _files(key: str, spec: Mapping[str, Any]) -> Axis:
+def _file_axis(key: str, spec: Mapping[str, Any]) -> Axis:
     pattern = spec["files"]
     patterns = pattern if isinstance(pattern, list) else [pattern]
     if not patterns or not all(isinstance(item, str) for item in patterns):
@@ -159,10 +159,10 @@ def _files(key: str, spec: Mapping[str, Any]) -> Axis:
             paths.append(base)
         else:
             raise ValueError(f"there is no file {base}")
-    _refuse_many(len(paths), _MOST_FILES)
+    _refuse_too_many(len(paths), _MOST_FILES)
     names = Counter(path.name for path in paths)
     labels = tuple(path.name if names[path.name] == 1 else str(path) for path in paths)
-    _refuse_twice(labels)
+    _refuse_duplicates(labels)
     sets = tuple(((key, str(path.resolve())),) for path in paths)
     return Axis(key, labels, sets, ((),) * len(labels), files=True)
 
@@ -180,25 +180,26 @@ def _linked_axis(key: str, spec: Mapping[str, Any]) -> Axis:
         raise ValueError(
             "linked values need values = [...], and set = {key = [...]} with as many for each key"
         )
-    _refuse_many(len(labels))
+    _refuse_too_many(len(labels))
     columns = flatten_axes(keys)
     for name, column in columns.items():
         if not isinstance(column, list) or len(column) != len(labels):
             raise ValueError(f"set: {name} must be a list of {len(labels)} values, one per value")
-    shown = tuple(label_of(label) for label in labels)
-    _refuse_twice(shown)
+    shown = tuple(axis_value_label(label) for label in labels)
+    _refuse_duplicates(shown)
     types = {name: column for name, column in columns.items() if name.startswith(SWAP)}
     sets, swaps = (
         tuple(tuple((name, column[i]) for name, column in of.items()) for i in range(len(labels)))
         for of in ({n: c for n, c in columns.items() if n not in types}, types)
     )
     named = tuple(
-        tuple((name.removeprefix(SWAP), absolute(value)) for name, value in one) for one in swaps
+        tuple((name.removeprefix(SWAP), absolute_type_name(value)) for name, value in one)
+        for one in swaps
     )
     return Axis(key, shown, sets, named)
 
 
-def _range(spec: Mapping[str, Any]) -> list[Any]:
+def _range_values(spec: Mapping[str, Any]) -> list[Any]:
     if "from" not in spec or "to" not in spec or ("step" in spec) == ("steps" in spec):
         raise ValueError("a range needs from, to, and either step or steps")
     low, high = parse_rational(spec["from"]), parse_rational(spec["to"])
@@ -218,7 +219,7 @@ def _range(spec: Mapping[str, Any]) -> list[Any]:
             raise ValueError("steps is how many values: a whole number of 1 or more")
         count = steps
         step = (high - low) / (count - 1) if count > 1 else Fraction(0)
-    _refuse_many(count)
+    _refuse_too_many(count)
     if not log:
         return [scene_number(low + k * step) for k in range(count)]
     if low <= 0:
@@ -231,7 +232,7 @@ def _range(spec: Mapping[str, Any]) -> list[Any]:
     return [scene_number(low), *inner, scene_number(high)]
 
 
-def _phases(key: str, spec: Mapping[str, Any], scene: Scene) -> list[Any]:
+def _phase_offsets(key: str, spec: Mapping[str, Any], scene: Scene) -> list[Any]:
     """Return offsets over the whole beat period of two clocks, in equal steps."""
     parts = key.split(".")
     other = str(spec["beat_with"])
@@ -252,7 +253,7 @@ def _phases(key: str, spec: Mapping[str, Any], scene: Scene) -> list[Any]:
     steps = spec.get("steps", 32)
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise ValueError("steps is how many phases: a whole number of 1 or more")
-    _refuse_many(steps)
+    _refuse_too_many(steps)
     return [scene_number(beat_period_s(*periods) * k / steps) for k in range(steps)]
 
 

@@ -23,11 +23,11 @@ import pyarrow.parquet as pq
 
 from dsa_des.arrays.column_values import Text
 from dsa_des.arrays.types import AnyArray, IntArray
-from dsa_des.block.foreign_calls import error_text, is_stop_request
+from dsa_des.block.foreign_calls import error_with_kind, is_stop_request
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.files.sealed_files import parquet
+from dsa_des.files.sealed_files import sealable_parquet
 from dsa_des.record.failure_counts import FailureCounts, add_counts
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.replicas.lock_step_size import FEW, MOST_BYTES, RunSize, are_few
 from dsa_des.replicas.replicas import Failed, Recorded, failure_counts_of_runs, run_replicas
 from dsa_des.results.folder import failure_counts_of_part
@@ -41,10 +41,10 @@ from dsa_des.results.record import (
 )
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Allocation
-from dsa_des.studies.foreseen import choose_runs, foresee_all, geometry_of
-from dsa_des.studies.metric import Group, Metric, columns_wanted, measure_one_by_one, missing_values
+from dsa_des.studies.foreseen import choose_runs, geometry_of, predict_results_and_errors
+from dsa_des.studies.metric import Group, Metric, measure_one_by_one, missing_values, needed_columns
 from dsa_des.studies.splitting import Nearness, SplitEvent, run_split
-from dsa_des.studies.study import Chunk, Study, set_text
+from dsa_des.studies.study import Chunk, Study, format_set_value
 
 #: After so many runs at once a worker looks for garbage, or the next ones stand beside it.
 _MANY_RUNS = 64
@@ -53,7 +53,7 @@ _OBJECTS_AT_ONCE = 50_000
 
 
 @dataclass(frozen=True)
-class Done:
+class ChunkResult:
     """The result of a chunk: the bytes of its part, until they are written, and its runs.
 
     `failed` of them gave no result, and of those `crashed` because their process died.
@@ -80,13 +80,13 @@ def schema_of(study: Study) -> pa.Schema:
     )
 
 
-def run_chunk(study: Study, chunk: Chunk) -> Done:
+def run_chunk(study: Study, chunk: Chunk) -> ChunkResult:
     """Run a chunk; a run that fails is a row with its error and the command that repeats it."""
     (done,) = run_chunks(study, [chunk])
     return done
 
 
-def run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[Done]:
+def run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[ChunkResult]:
     """Run chunks of one round together, each as it would be by itself."""
     with _delay_garbage_collection():
         return _run_chunks(study, chunks)
@@ -103,7 +103,7 @@ def _delay_garbage_collection() -> Iterator[None]:
         gc.set_threshold(*usual)
 
 
-def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[Done]:
+def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[ChunkResult]:
     began_s = time.process_time()
     schema = schema_of(study)
     tables: list[list[pa.Table]] = [[] for _ in chunks]
@@ -122,7 +122,7 @@ def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[Done]:
             tables[k].append(rows.slice(begin, end - start))
             begin += end - start
     done = [
-        done_of(chunk.name, pa.concat_tables(parts), add_counts(said))
+        make_chunk_result(chunk.name, pa.concat_tables(parts), add_counts(said))
         for chunk, parts, said in zip(chunks, tables, failure_counts, strict=True)
     ]
     runs = sum(map(len, chunks))
@@ -132,39 +132,41 @@ def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[Done]:
     return [replace(one, cpu_s=each_s * one.runs) for one in done]
 
 
-def crashed_run(study: Study, chunk: Chunk, tries: int) -> Done:
+def crashed_run(study: Study, chunk: Chunk, tries: int) -> ChunkResult:
     """Return the rows of runs whose process died every time."""
     schema = schema_of(study)
     tables = []
     for cell, start, end in chunk.runs:
-        rows = _leading(study, cell, range(start, end))
+        rows = _leading_columns(study, cell, range(start, end))
         rows["error"] = [f"the process that ran it died, {tries} times"] * (end - start)
         rows["status"] = [CRASHED] * (end - start)
-        tables.append(_table(study, schema, cell, rows, {}))
-    return done_of(chunk.name, pa.concat_tables(tables), {})
+        tables.append(_chunk_table(study, schema, cell, rows, {}))
+    return make_chunk_result(chunk.name, pa.concat_tables(tables), {})
 
 
-def done_of(name: str, table: pa.Table, counts: FailureCounts) -> Done:
+def make_chunk_result(name: str, table: pa.Table, counts: FailureCounts) -> ChunkResult:
     """Return rows as the result of a chunk, with what blocks could not do in these runs."""
     table = table.combine_chunks()
     status = table["status"].to_pylist()
     failed = len(status) - status.count(DONE)
     about = json.dumps(counts).encode() if counts else b""
-    return Done(name, parquet(table, about), table.num_rows, failed, status.count(CRASHED))
+    return ChunkResult(
+        name, sealable_parquet(table, about), table.num_rows, failed, status.count(CRASHED)
+    )
 
 
-def join_pieces(name: str, parts: Sequence[Done]) -> Done:
+def join_pieces(name: str, parts: Sequence[ChunkResult]) -> ChunkResult:
     """Return pieces of a chunk as one, in order of cell and replica."""
     tables = [pq.read_table(pa.BufferReader(part.content)) for part in parts]
     failure_counts = add_counts(map(failure_counts_of_part, tables))
     rows = pa.concat_tables([table.replace_schema_metadata(None) for table in tables])
-    done = done_of(
+    done = make_chunk_result(
         name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), failure_counts
     )
     return replace(done, cpu_s=sum(part.cpu_s for part in parts))
 
 
-def _leading(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:
+def _leading_columns(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:
     replicas = [study.replica(number, cell) for number in numbers]
     rows: dict[str, list[Any]] = {
         "cell": [cell] * len(numbers),
@@ -178,11 +180,13 @@ def _leading(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[
         rows[axis.column] = [label if axis.numeric else str(label)] * len(numbers)
     for draw in study.draws:
         values = [replica.changes[draw.key] for replica in replicas]
-        rows[draw_column(draw.key)] = [float(v) if draw.numeric else set_text(v) for v in values]
+        rows[draw_column(draw.key)] = [
+            float(v) if draw.numeric else format_set_value(v) for v in values
+        ]
     return rows
 
 
-def _table(
+def _chunk_table(
     study: Study,
     schema: pa.Schema,
     cell: int,
@@ -219,13 +223,13 @@ def _run_cell(
 
     What blocks could not do is put to `failure_counts` of the chunk that each replica is `of`.
     """
-    rows = _leading(study, cell, numbers)
+    rows = _leading_columns(study, cell, numbers)
     try:
         scene = study.scene(cell)
         metrics = [spec.build(scene) for spec in study.metrics]
     except (SceneError, ValueError) as error:
         rows["error"] = [str(error)] * len(numbers)
-        return _table(study, schema, cell, rows, {})
+        return _chunk_table(study, schema, cell, rows, {})
     replicas = [study.replica(number, cell) for number in numbers]
     key = str(study.path), cell
     if isinstance(metrics[0], SplitEvent):
@@ -246,11 +250,11 @@ def _run_cell(
             measure, known=repr((study.tables, study.base.data, study.seed, study.sets,
                                  study.swaps, cell)),
         )  # fmt: skip
-        return _table(study, schema, cell, rows, values)
+        return _chunk_table(study, schema, cell, rows, values)
     if not study.allocate:
         values = _fly_replicas(scene, metrics, replicas, rows["error"], key, of, failure_counts)
-        return _table(study, schema, cell, rows, values)
-    known, errors = foresee_all(scene, metrics, replicas)
+        return _chunk_table(study, schema, cell, rows, values)
+    known, errors = predict_results_and_errors(scene, metrics, replicas)
     for k, text in errors.items():
         rows["error"][k] = text
     results = [result for metric in metrics for result in metric.results()]
@@ -265,7 +269,9 @@ def _run_cell(
     for name, column in flown.items():
         values[name] = missing_values(len(numbers), text=column.dtype == object)
         values[name][these] = column
-    return _table(study, schema, cell, rows, values | known | predicted | {STANDS_FOR: shares})
+    return _chunk_table(
+        study, schema, cell, rows, values | known | predicted | {STANDS_FOR: shares}
+    )
 
 
 def _fly_replicas(
@@ -282,7 +288,7 @@ def _fly_replicas(
     What went wrong is put among `errors`, what blocks could not do to its chunk's counts.
     """
     values: dict[str, AnyArray] = {}
-    done, wanted = 0, columns_wanted(metrics)
+    done, wanted = 0, needed_columns(metrics)
     if len(_size_of_a_run) > _MOST_KNOWN:
         _size_of_a_run.clear()
     if key not in _size_of_a_run and not are_few(scene, len(replicas)):
@@ -295,7 +301,7 @@ def _fly_replicas(
         left = len(replicas) - done
         many = math.ceil(left / math.ceil(left / most))
         part = replicas[done : done + many]
-        outcomes = _outcomes(scene, part, wanted)
+        outcomes = _run_or_fail(scene, part, wanted)
         for chunk in np.unique(of[done : done + many]).tolist():
             mine = np.flatnonzero(of[done : done + many] == chunk)
             failure_counts[chunk].append(failure_counts_of_runs(outcomes[k] for k in mine))
@@ -307,7 +313,7 @@ def _fly_replicas(
         for k, outcome in enumerate(outcomes):
             if isinstance(outcome, Failed):
                 errors[done + k] = outcome.error
-        result, wrong = _measure(scene, metrics, [(part[k], outcomes[k]) for k in good])
+        result, wrong = _measure_metrics(scene, metrics, [(part[k], outcomes[k]) for k in good])
         for name, column in result.items():
             nothing = missing_values(len(replicas), text=column.dtype == object)
             values.setdefault(name, nothing)[done + np.array(good)] = column
@@ -320,7 +326,7 @@ def _fly_replicas(
 def _likely_size(scene: Scene, replica: Replica, wanted: Mapping[str, Any]) -> RunSize:
     """Return what a run holds, before any has run: few runs to begin with would cost much."""
     try:
-        return RunSize.of(scene_of(scene, replica), wanted)
+        return RunSize.of(replica_scene(scene, replica), wanted)
     except (SceneError, BlockFailure):  # its row says why
         return RunSize(MOST_BYTES / FEW)
 
@@ -335,7 +341,7 @@ def _bytes_of(run: Recorded) -> int:
     return sum(c.codes.nbytes if isinstance(c, Text) else c.nbytes for c in columns)
 
 
-def _outcomes(
+def _run_or_fail(
     scene: Scene, replicas: Sequence[Replica], wanted: Mapping[str, Any]
 ) -> list[Recorded | Failed]:
     """Run replicas; whatever one of them raises, memory that is short included, is its error."""
@@ -344,17 +350,17 @@ def _outcomes(
     except (Exception, SystemExit) as error:  # a block that wants to leave does not end the study
         if len(replicas) == 1:
             return [Failed(f"{type(error).__name__}: {error}")]
-    return [_outcomes(scene, [replica], wanted)[0] for replica in replicas]
+    return [_run_or_fail(scene, [replica], wanted)[0] for replica in replicas]
 
 
-def _measure(
+def _measure_metrics(
     scene: Scene, metrics: Sequence[Metric], runs: Sequence[tuple[Replica, Any]]
 ) -> tuple[dict[str, AnyArray], dict[int, str]]:
     """Return result → values over the runs, and the error of every run that gave none."""
     if not runs:
         return {}, {}
     group = Group(
-        scene, [replica for replica, _ in runs], [run for _, run in runs], columns_wanted(metrics)
+        scene, [replica for replica, _ in runs], [run for _, run in runs], needed_columns(metrics)
     )
     values: dict[str, AnyArray] = {}
     for metric in metrics:
@@ -364,6 +370,6 @@ def _measure(
             if is_stop_request(error):
                 raise
             if len(runs) == 1:
-                return {}, {0: f"metric {type(metric).__name__}: {error_text(error)}"}
-            return measure_one_by_one(partial(_measure, scene, metrics), runs)
+                return {}, {0: f"metric {type(metric).__name__}: {error_with_kind(error)}"}
+            return measure_one_by_one(partial(_measure_metrics, scene, metrics), runs)
     return values, {}

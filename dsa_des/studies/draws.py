@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import IntArray
-from dsa_des.errors import nearest
-from dsa_des.scene.keys import flat
+from dsa_des.errors import nearest_name
+from dsa_des.scene.keys import flatten_tables
 from dsa_des.studies.axes import Axis
 from dsa_des.time.randomness import key_of
 
@@ -56,10 +56,10 @@ class Draw:
         if self.kind == "sequence":
             first, step = self.values
             return first + step * replica
-        u = uniform(seed, self.key, replica)
+        u = uniform_of_replica(seed, self.key, replica)
         if self.stratified:
             block, index = divmod(replica, batch)
-            u = (int(_strata(seed, self.key, block, batch)[index]) + u) / batch
+            u = (int(_shuffled_strata(seed, self.key, block, batch)[index]) + u) / batch
         if self.kind == "choice":
             return self.values[min(int(u * len(self.values)), len(self.values) - 1)]
         low, high = self.values
@@ -81,13 +81,13 @@ def replica_seed(seed: int, replica: int) -> int:
     return key_of(seed, "study replica", replica) >> 1
 
 
-def uniform(seed: int, key: str, replica: int) -> float:
+def uniform_of_replica(seed: int, key: str, replica: int) -> float:
     """Return a number from [0, 1) for a replica, by a seed and what it is drawn for."""
     return (key_of(seed, "study draw", key, replica) >> 11) * 2.0**-53
 
 
 @lru_cache(maxsize=64)
-def _strata(seed: int, key: str, block: int, batch: int) -> IntArray:
+def _shuffled_strata(seed: int, key: str, block: int, batch: int) -> IntArray:
     generator = np.random.Generator(np.random.Philox(key_of(seed, "study strata", key, block)))
     return np.asarray(generator.permutation(batch), dtype=np.int64)
 
@@ -102,7 +102,7 @@ def flatten_draws(tables: Mapping[str, Any]) -> dict[str, Any]:
             or not any(isinstance(item, dict) for item in value.values())
         )
 
-    return flat(tables, is_draw)
+    return flatten_tables(tables, is_draw)
 
 
 def parse_draw(key: str, table: Any) -> Draw:
@@ -113,7 +113,7 @@ def parse_draw(key: str, table: Any) -> Draw:
         raise ValueError(form)
     ((kind, values),) = table.items()
     if kind not in KINDS or not isinstance(values, list | dict):
-        close = None if kind in KINDS else nearest(str(kind), KINDS)
+        close = None if kind in KINDS else nearest_name(str(kind), KINDS)
         raise ValueError(form + (f"; did you mean {close!r}?" if close else ""))
     if kind == "latin_hypercube" and isinstance(values, dict):
         inner = parse_draw(key, values)
@@ -176,13 +176,13 @@ def member_seed(seed: int, members: Iterable[tuple[Axis, int]]) -> int:
     Members are values, by their index, of axes that are a sample, in any order; without any the
     study's seed stays.
     """
-    parts = sorted((axis.key, *identity(axis, index)) for axis, index in members)
+    parts = sorted((axis.key, *axis_value_identity(axis, index)) for axis, index in members)
     return (
         key_of(seed, "study sample", *(text for part in parts for text in part)) if parts else seed
     )
 
 
-def identity(axis: Axis, index: int) -> tuple[str, ...]:
+def axis_value_identity(axis: Axis, index: int) -> tuple[str, ...]:
     """Return what tells one value of an axis from all others.
 
     A file is known by its name, without its folder, and its content: it keeps its draws wherever

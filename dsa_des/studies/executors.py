@@ -25,7 +25,7 @@ from dsa_des.block.foreign import is_ours
 from dsa_des.errors import UsageError
 from dsa_des.results.folder import Parts
 from dsa_des.studies.attempts import Attempts, Piece, run_together
-from dsa_des.studies.chunk import Done, run_chunks
+from dsa_des.studies.chunk import ChunkResult, run_chunks
 from dsa_des.studies.study import Chunk, Study
 
 #: How many pieces a worker has at a time: the next one is there when it ends the first.
@@ -39,7 +39,7 @@ _HOME = str(Path(__file__).parents[2])
 class Executor(Protocol):
     """Something that runs chunks."""
 
-    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[Done]:
+    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[ChunkResult]:
         """Run all chunks, have their parts written, and give what each came to when it is there.
 
         One that is no whole part, or was cut on the way, comes with its rows and is not written.
@@ -49,7 +49,7 @@ class Executor(Protocol):
         """Stop all workers."""
 
 
-def run_and_write(study: Study, parts: Parts, chunks: Sequence[Chunk]) -> list[Done]:
+def run_and_write(study: Study, parts: Parts, chunks: Sequence[Chunk]) -> list[ChunkResult]:
     """Run chunks together and write the parts of those that are whole; only others keep rows."""
     parts.check()
     result = run_chunks(study, chunks)
@@ -63,7 +63,7 @@ def run_and_write(study: Study, parts: Parts, chunks: Sequence[Chunk]) -> list[D
 class Serial:
     """Runs chunks one after the other in this process."""
 
-    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[Done]:
+    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[ChunkResult]:
         """Run all chunks in their order."""
         for some in run_together(study, list(chunks), 1):
             yield from run_and_write(study, parts, some)
@@ -83,7 +83,7 @@ class Local:
         self._count = workers
         self._workers: list[_Worker] = []
 
-    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[Done]:
+    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[ChunkResult]:
         """Run all chunks; two pieces per worker are under way at a time."""
         attempts = Attempts(study, run_together(study, list(chunks), self._count))
         if not self._workers or any(w.study is not study or len(w) for w in self._workers):
@@ -114,12 +114,12 @@ class _Worker:
     def __init__(self, study: Study) -> None:
         self.study = study
         self._pool: ProcessPoolExecutor | None = None
-        self._given: deque[tuple[Future[list[Done]], Piece]] = deque()
+        self._given: deque[tuple[Future[list[ChunkResult]], Piece]] = deque()
 
     def __len__(self) -> int:
         return len(self._given)
 
-    def futures(self) -> list["Future[list[Done]]"]:
+    def futures(self) -> list["Future[list[ChunkResult]]"]:
         """What is under way."""
         return [future for future, _ in self._given]
 
@@ -135,7 +135,7 @@ class _Worker:
             future.set_exception(error)
         self._given.append((future, piece))
 
-    def pop(self) -> "tuple[Future[list[Done]], Piece] | None":
+    def pop(self) -> "tuple[Future[list[ChunkResult]], Piece] | None":
         """Return the first piece if it is finished or lost."""
         return self._given.popleft() if self._given and self._given[0][0].done() else None
 
@@ -156,7 +156,7 @@ class _Worker:
             self._pool = None
 
 
-def _finished_pieces(worker: _Worker, attempts: Attempts) -> Iterator[Done]:
+def _finished_pieces(worker: _Worker, attempts: Attempts) -> Iterator[ChunkResult]:
     while (first := worker.pop()) is not None:
         future, piece = first
         try:
@@ -241,7 +241,7 @@ def _start_worker(study: Study) -> None:
         threading.Thread(target=follow, daemon=True).start()
 
 
-def _run_in_worker(parts: Parts, chunks: Sequence[Chunk]) -> list[Done]:
+def _run_in_worker(parts: Parts, chunks: Sequence[Chunk]) -> list[ChunkResult]:
     try:
         return run_and_write(_studied[0], parts, chunks)
     except KeyboardInterrupt:  # raised by a block: ctrl-C does not come here
@@ -283,7 +283,7 @@ class Dask:
                 f"{_CONNECT_TIMEOUT_S} s ({type(error).__name__}); {_START_DASK}"
             ) from error
 
-    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[Done]:
+    def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[ChunkResult]:
         """Run all chunks; Dask itself first runs again what a dead worker was at."""
         from distributed import as_completed
         from distributed.scheduler import KilledWorker

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, FloatArray
-from dsa_des.block.foreign_calls import error_text, is_stop_request
+from dsa_des.block.foreign_calls import error_with_kind, is_stop_request
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.record import (
@@ -34,9 +34,9 @@ from dsa_des.studies.allocation import (
     Allocation,
     ForeseenRuns,
     draw_runs,
-    learn,
+    learn_allocation,
 )
-from dsa_des.studies.draws import uniform
+from dsa_des.studies.draws import uniform_of_replica
 from dsa_des.studies.metric import Group, Metric, expected_column, measure_one_by_one
 from dsa_des.studies.study import AUTO, Study
 
@@ -64,7 +64,7 @@ def allocation_refusal(study: Study, scene: Scene) -> str:
         return "no metric of the study tells encounters apart by their geometry: add risk_ratio"
     if study.over:
         return f"goes with replicas, and not with a sample along an axis ({', '.join(study.over)})"
-    known = foresee(scene, list(metrics.values()), [study.replica(0)])
+    known = predict_results(scene, list(metrics.values()), [study.replica(0)])
     for one in metrics.values():
         for result in one.results():
             if result.name not in known and result.kind not in (EVENT, RATIO):
@@ -80,7 +80,7 @@ def ratios_of(results: Sequence[Result], allocate: Sequence[str]) -> list[Result
     return [one for one in ratios if one.name in allocate]
 
 
-def foresee(
+def predict_results(
     scene: Scene, metrics: Sequence[Metric], replicas: Sequence[Replica]
 ) -> dict[str, AnyArray]:
     """Return what is known of runs without flying them: results, and columns of geometry."""
@@ -99,18 +99,18 @@ def foresee(
     return {name: np.concatenate(values) for name, values in parts.items()}
 
 
-def foresee_all(
+def predict_results_and_errors(
     scene: Scene, metrics: Sequence[Metric], replicas: Sequence[Replica]
 ) -> tuple[dict[str, AnyArray], dict[int, str]]:
     """Return what is known of runs before they are flown, and the error of each that gave none."""
     try:
-        return foresee(scene, metrics, replicas), {}
+        return predict_results(scene, metrics, replicas), {}
     except BaseException as error:
         if is_stop_request(error):
             raise
         if len(replicas) == 1:
-            return {}, {0: f"before it is flown: {error_text(error)}"}
-    return measure_one_by_one(partial(foresee_all, scene, metrics), replicas)
+            return {}, {0: f"before it is flown: {error_with_kind(error)}"}
+    return measure_one_by_one(partial(predict_results_and_errors, scene, metrics), replicas)
 
 
 def choose_runs(
@@ -129,7 +129,7 @@ def choose_runs(
         return np.ones(len(numbers)), {}
     ratios = [one.ratio for one in ratios_of(results, study.allocate) if one.ratio is not None]
     seed = study.member_seed(cell)
-    draws = [uniform(seed, "study allocation", number) for number in numbers]
+    draws = [uniform_of_replica(seed, "study allocation", number) for number in numbers]
     known = _known_runs(columns, ratios)
     predicted: dict[str, FloatArray] = {}
     for of, chance in zip(ratios, plan.predictions(known), strict=True):
@@ -147,7 +147,7 @@ def _known_runs(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> Forese
                for of in ratios]  # fmt: skip
     return ForeseenRuns(
         np.array(geometry, dtype=np.float64),
-        np.array([_of_class(columns, of, columns[of.below]) for of in ratios]),
+        np.array([_flags_in_class(columns, of, columns[of.below]) for of in ratios]),
         np.array(
             [
                 columns[name] if name in columns else np.full(len(weights[0]), UNTOLD)
@@ -158,13 +158,13 @@ def _known_runs(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> Forese
     )
 
 
-def _of_class(columns: Mapping[str, Any], of: RatioOf, flags: AnyArray) -> FloatArray:
+def _flags_in_class(columns: Mapping[str, Any], of: RatioOf, flags: AnyArray) -> FloatArray:
     """Return flags of an event, 0 outside the class that a ratio is of."""
     result: FloatArray = np.nan_to_num(flags.astype(np.float64))
     return result if of.only is None else result * (columns[of.only[0]] == of.only[1])
 
 
-def plans_of(
+def allocations_of_round(
     study: Study, folder: StudyFolder, number: int, first: int, cells: Sequence[int]
 ) -> dict[int, Allocation]:
     """Return the plan of every cell for the round that begins with a replica, by earlier rounds."""
@@ -189,9 +189,11 @@ def plans_of(
         stood = rows.column(STANDS_FOR)[chosen]
         if not (stood > 0.0).any():
             continue
-        happened = [_of_class(columns, of, columns[of.above]) for of in ratios]
+        happened = [_flags_in_class(columns, of, columns[of.above]) for of in ratios]
         least = LEAST if first >= PILOT else FIRST_LEAST
-        plans[int(cell)] = learn(_known_runs(columns, ratios), np.array(happened), stood, least)
+        plans[int(cell)] = learn_allocation(
+            _known_runs(columns, ratios), np.array(happened), stood, least
+        )
     return plans
 
 
@@ -200,10 +202,10 @@ def _first_plan(study: Study, cell: int, ratios: Sequence[RatioOf]) -> Allocatio
     replicas = [study.replica(n, cell) for n in range(min(PILOT, study.round_ends[0]))]
     try:
         scene = study.scene(cell)
-        columns = foresee(scene, [spec.build(scene) for spec in study.metrics], replicas)
+        columns = predict_results(scene, [spec.build(scene) for spec in study.metrics], replicas)
     except Exception:  # the rows of its runs say what is wrong
         return None
     none = np.zeros(len(replicas))
-    return learn(
+    return learn_allocation(
         _known_runs(columns, ratios), np.zeros((len(ratios), len(none))), none, FIRST_LEAST
     )

@@ -20,9 +20,9 @@ from dsa_des.files.input_files import resolve_home
 from dsa_des.files.output_folder import RUN_JSON
 from dsa_des.files.toml_files import to_toml
 from dsa_des.record.version import __version__
-from dsa_des.replicas.changed_scene import scene_of
+from dsa_des.replicas.changed_scene import replica_scene
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.labels import short
+from dsa_des.results.labels import short_text
 from dsa_des.results.models import EXPLAINED, Explained, SceneRecord, read_explained, versions
 from dsa_des.results.record import Result, StudyRecord, draw_column
 from dsa_des.scene.keys import name_items
@@ -31,8 +31,8 @@ from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import file_digest
 from dsa_des.studies.foreseen import geometry_of
-from dsa_des.studies.study import Study, set_text
-from dsa_des.studies.study_checks import one_per_value
+from dsa_des.studies.study import Study, format_set_value
+from dsa_des.studies.study_checks import cells_covering_values
 from dsa_des.studies.study_tables import json_safe
 
 #: Cells that are looked at: the first, and one for each value of an axis.
@@ -171,16 +171,16 @@ def is_category(axis: Axis, scene: Scene) -> bool:
         if len(parts) != 3 or parts[0] != "blocks" or parts[1] not in scene.blocks:
             return False
         known = scene.blocks[parts[1]].cls.Parameters.model_fields.get(parts[2])
-        if known is None or not _is_of_names(known.annotation):
+        if known is None or not _is_choice_of_names(known.annotation):
             return False
     return bool(axis.swaps and axis.swaps[0]) or bool(axis.sets and axis.sets[0])
 
 
-def _is_of_names(annotation: Any) -> bool:
+def _is_choice_of_names(annotation: Any) -> bool:
     if get_origin(annotation) is Literal or annotation is bool:
         return True
     parts = [part for part in get_args(annotation) if part is not type(None)]
-    return bool(parts) and all(_is_of_names(part) for part in parts)
+    return bool(parts) and all(_is_choice_of_names(part) for part in parts)
 
 
 def record_text(study: Study, digest: str) -> str:
@@ -201,7 +201,9 @@ def record_text(study: Study, digest: str) -> str:
                 "over": axis.column in study.over,
                 "numeric": axis.numeric,
                 "category": is_category(axis, study.scene(0)),
-                "sets": [[(key, set_text(value)) for key, value in one] for one in axis.sets],
+                "sets": [
+                    [(key, format_set_value(value)) for key, value in one] for one in axis.sets
+                ],
                 "swaps": axis.swaps,
             }
             for axis in study.axes
@@ -214,7 +216,7 @@ def record_text(study: Study, digest: str) -> str:
             vars(result) | {"ratio": None if result.ratio is None else vars(result.ratio)}
             for result in results_of(study)
         ],
-        "sets": [(key, set_text(value)) for key, value in study.sets],
+        "sets": [(key, format_set_value(value)) for key, value in study.sets],
         "swaps": study.swaps,
         "compare": study.baseline,
         "compare_weight": study.compare_weight,
@@ -241,11 +243,11 @@ def explain_study(study: Study) -> Explained:
     """Return of what a study's runs are made."""
     scenes: list[SceneRecord] = []
     text = ""
-    for cell in one_per_value(study)[:_MOST_CELLS]:
+    for cell in cells_covering_values(study)[:_MOST_CELLS]:
         labels = study.labels(cell)
-        where = ", ".join(f"{name} = {short(value)}" for name, value in labels.items())
+        where = ", ".join(f"{name} = {short_text(value)}" for name, value in labels.items())
         try:
-            scene = scene_of(study.scene(cell), study.replica(0, cell))
+            scene = replica_scene(study.scene(cell), study.replica(0, cell))
             record = scene_record(where, scene)
             text = text or to_toml(scene.resolved())
         except (SceneError, BlockFailure, ValueError):
@@ -262,7 +264,7 @@ def _subtract_record(result: SceneRecord, first: SceneRecord) -> SceneRecord:
     return result.model_copy(update=new)
 
 
-def keep_explained(study: Study, folder: StudyFolder) -> None:
+def write_explained(study: Study, folder: StudyFolder) -> None:
     """Write ``explained.json`` into a study's folder, unless it is there."""
     if read_explained(folder) is None:
         content = explain_study(study).model_dump()

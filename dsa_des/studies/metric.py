@@ -20,7 +20,7 @@ from dsa_des.block.message import Columns, Text
 from dsa_des.block.registry import ClassText
 from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.drawn_columns import ReplicaScenes, scenes_of
+from dsa_des.replicas.drawn_columns import ReplicaScenes, replica_scenes
 from dsa_des.replicas.replicas import Recorded
 from dsa_des.results.record import (
     CLASS,
@@ -31,9 +31,9 @@ from dsa_des.results.record import (
     RATIO,
     SHARE,
     TRIALS,
+    ChangeWords,
     RatioOf,
     Result,
-    Told,
 )
 from dsa_des.scene.scene import Scene
 
@@ -48,19 +48,19 @@ __all__ = [
     "RATIO",
     "SHARE",
     "TRIALS",
+    "ChangeWords",
     "Group",
     "Metric",
     "RatioOf",
     "Result",
-    "Told",
+    "blocks_recording",
     "check_recorded",
     "check_tables",
-    "columns_wanted",
     "expected_column",
     "find_metric",
     "measure_one_by_one",
     "missing_values",
-    "recorded_by",
+    "needed_columns",
 ]  # fmt: skip
 
 METRICS = "dsa_des.metrics"
@@ -113,7 +113,7 @@ class Group:
     @cached_property
     def scenes(self) -> Sequence[Scene]:
         """The scene of every replica with its changes."""
-        return scenes_of(self.scene, self.replicas)
+        return replica_scenes(self.scene, self.replicas)
 
     def parameters_of(self, block: str) -> Sequence[Any]:
         """Return a block's parameters in every replica."""
@@ -127,7 +127,7 @@ class Group:
 
 
 def _concatenate_columns(table: str, columns: Any, recorded: Sequence[Recorded]) -> Columns:
-    parts = [part for part in _parts(table, recorded) if len(part["tick"])]
+    parts = [part for part in _recorded_parts(table, recorded) if len(part["tick"])]
     joined: Columns = {"replica": _concatenate([part["replica"] for part in parts])}
     for name in columns:
         if any(name not in part for part in parts):
@@ -141,7 +141,7 @@ def _concatenate_columns(table: str, columns: Any, recorded: Sequence[Recorded])
     return joined
 
 
-def _parts(table: str, recorded: Sequence[Recorded]) -> Iterator[Columns]:
+def _recorded_parts(table: str, recorded: Sequence[Recorded]) -> Iterator[Columns]:
     """Return what was recorded in one table, with ``replica``: of a whole lock step at once."""
     start = 0
     while start < len(recorded):
@@ -164,11 +164,11 @@ def _concatenate(pieces: Sequence[Any]) -> Any:
     if len(pieces) == 1:
         return pieces[0]
     if pieces and isinstance(pieces[0], Text):
-        return _text(pieces)
+        return _join_texts(pieces)
     return np.concatenate(pieces) if pieces else np.empty(0, dtype=np.int64)
 
 
-def _text(pieces: Sequence[Text]) -> Text:
+def _join_texts(pieces: Sequence[Text]) -> Text:
     names: dict[str, int] = {}
     lookups: dict[tuple[str, ...], Any] = {}
     codes = []
@@ -266,7 +266,7 @@ def expected_column(event: str) -> str:
 def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:
     """Return a registered metric, or that of ``module:Class`` or ``./file.py:Class``."""
     if isinstance(name, ClassText):
-        return _metric(name, name.cls)
+        return _require_metric(name, name.cls)
     point = entry_points_of(METRICS).get(name)
     if point is None and ":" not in name:
         hint = did_you_mean(name, entry_points_of(METRICS))
@@ -277,16 +277,16 @@ def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:
         )
     except NotImportable as error:
         raise ValueError(str(error)) from error.__cause__
-    return _metric(name, result)
+    return _require_metric(name, result)
 
 
-def _metric(name: str, result: Any) -> type[Metric]:
+def _require_metric(name: str, result: Any) -> type[Metric]:
     if not (isinstance(result, type) and issubclass(result, Metric)):
         raise ValueError(f"{name} is not a dsa_des.studies.metric.Metric")
     return result
 
 
-def recorded_by(scene: Scene, table: str) -> list[str]:
+def blocks_recording(scene: Scene, table: str) -> list[str]:
     """Return the blocks of a scene that can record rows of a table, sorted by name."""
     return [name for name, cls in sorted(scene.classes.items()) if table in _tables_of(cls)]
 
@@ -300,7 +300,7 @@ def _tables_of(cls: type[Component]) -> set[str]:
 def check_tables(metric: type[Metric], scene: Scene) -> None:
     """Raise ValueError unless some block of the scene records each table the metric reads."""
     for table in metric.tables:
-        if not recorded_by(scene, table):
+        if not blocks_recording(scene, table):
             known = set().union(*(_tables_of(cls) for cls in scene.classes.values()))
             raise ValueError(
                 f"needs a block whose output records {table!r}; this scene's blocks record "
@@ -326,7 +326,7 @@ def check_recorded(metric: Metric, blocks: Mapping[str, Component]) -> None:
                          + "".join(asked))  # fmt: skip
 
 
-def columns_wanted(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:
+def needed_columns(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:
     """Return which columns of which tables metrics need, sorted; ``tick`` always."""
     wanted: dict[str, set[str]] = {}
     for metric in metrics:

@@ -11,16 +11,16 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from dsa_des.errors import SceneError, UsageError
-from dsa_des.replicas.changed_scene import scene_of
+from dsa_des.replicas.changed_scene import replica_scene
 from dsa_des.replicas.replicas import lock_step_refusal
 from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.record import CRASHED
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.results.tables import Expected, Tables
-from dsa_des.studies.chunk import Done, done_of, join_pieces
+from dsa_des.studies.chunk import ChunkResult, join_pieces, make_chunk_result
 from dsa_des.studies.executors import Executor
-from dsa_des.studies.foreseen import plans_of
-from dsa_des.studies.identity import keep_explained, record_of, results_of
+from dsa_des.studies.foreseen import allocations_of_round
+from dsa_des.studies.identity import record_of, results_of, write_explained
 from dsa_des.studies.study import Chunk, Study
 
 
@@ -65,7 +65,7 @@ def run_study(
     cells = list(study.cells)
     starts = [0, *study.round_ends[:-1]]
     try:
-        keep_explained(study, folder)
+        write_explained(study, folder)
     except OSError as error:
         raise Stopped(f"results cannot be written: {error.strerror or error}") from error
     try:
@@ -76,7 +76,7 @@ def run_study(
                 done_with = len(cells) - len(left)
                 progress.total -= done_with * (study.replicas - first)
                 cells = left
-            plans = plans_of(study, folder, number, first, cells)
+            plans = allocations_of_round(study, folder, number, first, cells)
             chunks = list(study.chunks(number, cells, plans))
             _run_round(study, folder, executor, chunks, number, report, progress)
         _remove_rounds(folder, len(starts))
@@ -97,24 +97,26 @@ def _run_round(
     """Run what is missing of a round: parts that are not there, and runs that crashed."""
     planned = {chunk.name for chunk in chunks}
     for name in folder.part_names():  # of a round that other cells took part in
-        if _round_of(name) == number and name not in planned and folder.part(name) is not None:
+        if _round_number(name) == number and name not in planned and folder.part(name) is not None:
             folder.remove_part(name)
     missing: list[Chunk] = []
-    kept: dict[str, Done] = {}
+    kept: dict[str, ChunkResult] = {}
     for chunk in chunks:
         rows = folder.part(chunk.name)
         if rows is None or not _is_same_runs(rows, chunk):
             missing.append(chunk)
             continue
         failure_counts = folder.failure_counts([chunk.name])
-        there = done_of(chunk.name, rows, failure_counts)
+        there = make_chunk_result(chunk.name, rows, failure_counts)
         progress.failed += there.failed - there.crashed
         progress.runs += there.runs - there.crashed
         if there.crashed:
             crashed = np.asarray(pc.equal(rows["status"], CRASHED))
-            missing.append(replace(chunk, runs=_runs_of(rows.filter(crashed)), whole=False))
+            missing.append(replace(chunk, runs=_runs_in_rows(rows.filter(crashed)), whole=False))
             if there.crashed < there.runs:
-                kept[chunk.name] = done_of(chunk.name, rows.filter(~crashed), failure_counts)
+                kept[chunk.name] = make_chunk_result(
+                    chunk.name, rows.filter(~crashed), failure_counts
+                )
     report(progress)
     try:
         for done in executor.run(study, folder.destination, missing):
@@ -129,14 +131,14 @@ def _run_round(
         raise Stopped(f"results cannot be written: {error}") from error
 
 
-def _round_of(name: str) -> int:
+def _round_number(name: str) -> int:
     return int(name.split("-")[1])
 
 
 def _remove_rounds(folder: StudyFolder, first: int) -> None:
     """Remove parts of this study that belong to rounds it no longer has."""
     for name in folder.part_names():
-        if _round_of(name) >= first and folder.part(name) is not None:
+        if _round_number(name) >= first and folder.part(name) is not None:
             folder.remove_part(name)
 
 
@@ -149,7 +151,7 @@ def _is_same_runs(rows: pa.Table, chunk: Chunk) -> bool:
     )
 
 
-def _runs_of(rows: pa.Table) -> tuple[tuple[int, int, int], ...]:
+def _runs_in_rows(rows: pa.Table) -> tuple[tuple[int, int, int], ...]:
     runs: list[tuple[int, int, int]] = []
     for cell, replica in zip(rows["cell"].to_pylist(), rows["replica"].to_pylist(), strict=True):
         if runs and runs[-1][0] == cell and runs[-1][2] == replica:
@@ -198,7 +200,7 @@ def _expected_answers(study: Study) -> Expected:
             scene = study.scene(cell)
             metrics = [spec.build(scene) for spec in study.metrics]
             for number in range(many):
-                own = scene_of(scene, study.replica(number, cell))
+                own = replica_scene(scene, study.replica(number, cell))
                 for metric in metrics:
                     for name, value in metric.analytic_answers(own).items():
                         sums.setdefault((name, at), []).append(value)
@@ -215,7 +217,7 @@ def draw_run(study: Study, folder: StudyFolder, cell: int, replica: int) -> list
 
     if cell >= len(study.cells) or replica >= study.replicas:
         return []
-    scene = scene_of(study.scene(cell), study.replica(replica, cell))
+    scene = replica_scene(study.scene(cell), study.replica(replica, cell))
     target = folder.path / f"run-cell-{cell}-replica-{replica}"
     if target.is_symlink():
         raise UsageError(f"{target}: is a link; the figures of a run are in a folder")

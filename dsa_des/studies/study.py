@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.block.foreign_calls import ForeignFailure, foreign_code
+from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
 from dsa_des.block.registry import add_source
-from dsa_des.block.source_file import absolute
+from dsa_des.block.source_file import absolute_type_name
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.record import FigureRecord, Requirement, StopWhen
 from dsa_des.scene.overrides import SWAP, apply_changes, read_sets
@@ -47,7 +47,7 @@ class MetricSpec:
         """Return the metric for a scene."""
         cls = find_metric(self.name, (scene.path.parent,))
         try:
-            with foreign_code(ValueError):
+            with wrap_foreign_errors(ValueError):
                 check_tables(cls, scene)
                 metric = cls(cls.Parameters.model_validate(dict(self.keys)), scene)
                 return SplitEvent(metric, self.splits) if self.splits else metric
@@ -212,7 +212,9 @@ class Study:
         """Return the command that runs one replica of a cell again."""
         swaps, sets = self.changes(cell)
         replica = self.replica(number, cell)
-        changes = [(key, set_text(value)) for key, value in [*sets, *replica.changes.items()]]
+        changes = [
+            (key, format_set_value(value)) for key, value in [*sets, *replica.changes.items()]
+        ]
         return run_command(str(self.scene_path), replica.seed, swaps, changes)
 
     def chunks(
@@ -241,15 +243,15 @@ class Study:
             yield Chunk(f"part-{round_number:03d}-{number:06d}", tuple(runs), plans)
 
 
-def set_text(value: Any) -> str:
+def format_set_value(value: Any) -> str:
     """Return a value the way ``--set`` takes it; a path as it is found from the study's folder."""
     folder = getattr(value, "folder", None)
     if folder is not None and (path := existing_file(value, folder)) is not None:
         return str(path)
     if isinstance(value, list | dict):
-        from dsa_des.files.toml_files import inline
+        from dsa_des.files.toml_files import inline_toml
 
-        return inline(value)
+        return inline_toml(value)
     return format_value(value)
 
 
@@ -257,7 +259,10 @@ def command_of(words: Iterable[str], sets: Iterable[str], *paths: Path) -> str:
     """Return the command line that runs files with the same ``--set`` from any folder."""
     every = ["dsa-des", *words]
     for key, value in read_sets(sets)[0]:
-        every += ["--set", f"{key}={set_text(absolute(value) if SWAP in key else value)}"]
+        every += [
+            "--set",
+            f"{key}={format_set_value(absolute_type_name(value) if SWAP in key else value)}",
+        ]
     return shell_line([*every, *(str(path.resolve()) for path in paths)])
 
 

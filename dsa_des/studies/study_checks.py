@@ -8,11 +8,11 @@ from typing import Any
 from dsa_des.errors import BlockFailure, Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_STUDY_SCANS
 from dsa_des.record.recording import Recorder
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.results.record import FRACTION, NUMBER, RATIO, SHARE, TRIALS, Result
 from dsa_des.results.summary import results_of_series
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.keys import Key, key_in
+from dsa_des.scene.keys import Key, parse_key_path
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.draws import Draw
@@ -36,7 +36,7 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
     whole, before = not file.problems, len(file.problems)
     _check_axes(study, file)
     scenes: list[Scene] = []
-    for cell in one_per_value(study):
+    for cell in cells_covering_values(study):
         try:
             scenes.append(study.scene(cell))
         except SceneError as error:
@@ -45,8 +45,8 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
     first = scenes[0]
     _check_draws(study, first, file)
     results: dict[str, Result] = {}
-    for one in _different(scenes):
-        where = "" if one is first else f" (with {_types(one, first)})"
+    for one in _scenes_by_block_types(scenes):
+        where = "" if one is first else f" (with {_differing_types_text(one, first)})"
         built = _build_metrics(study, one, where, file)
         if one is first:
             for metric in built:
@@ -88,7 +88,7 @@ def _check_ends(study: Study, scenes: list[Scene], file: SceneFile) -> None:
         value = draw.value(study.seed, last, study.batch)
         for scene in scenes[:_MOST_SCENES]:
             try:
-                _ = Simulation(scene_of(scene, Replica(0, {draw.key: value}))).components
+                _ = Simulation(replica_scene(scene, Replica(0, {draw.key: value}))).components
             except SceneError as error:
                 text = "; ".join(problem.message for problem in error.problems)
             except BlockFailure as error:
@@ -124,7 +124,7 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> None:
     for scene in scenes:
         try:
             recorder = Recorder([], wanted=dict.fromkeys(_tables_read(study, scene), ()))
-            simulation = Simulation(scene_of(scene, study.replica(0)), recorder=recorder)
+            simulation = Simulation(replica_scene(scene, study.replica(0)), recorder=recorder)
             if wrong is None and (said := _explain_endless(study, simulation.scans)):
                 file.report(("replicas",), said)
                 return
@@ -201,7 +201,7 @@ def _check_axes(study: Study, file: SceneFile) -> None:
     owner: dict[tuple[str | int, ...], str] = {}
     for axis in study.axes:
         for key in {key for sets in axis.sets for key, _ in sets}:
-            first = owner.setdefault(key_in(study.base.data, key), axis.key)
+            first = owner.setdefault(parse_key_path(study.base.data, key), axis.key)
             if first != axis.key:
                 file.report(("axes", axis.key), f"sets {key}, which the axis {first} sets as well")
 
@@ -210,17 +210,17 @@ def _check_draws(study: Study, scene: Scene, file: SceneFile) -> None:
     """Report draws of values that the scene does not allow, and of keys that are axes."""
     tables = study.base.data
     on_axes = {
-        key_in(tables, key): axis.key
+        parse_key_path(tables, key): axis.key
         for axis in study.axes
         for sets in axis.sets
         for key, _ in sets
     }
     for draw in study.draws:
-        if axis := on_axes.get(key_in(tables, draw.key)):
+        if axis := on_axes.get(parse_key_path(tables, draw.key)):
             file.report(("draws", draw.key), f"is set by the axis {axis}: draw it, or vary it")
-        for value in _extreme_values(draw, study):
+        for value in _extreme_draws(draw, study):
             try:
-                scene_of(scene, Replica(0, {draw.key: value}))
+                replica_scene(scene, Replica(0, {draw.key: value}))
             except SceneError as error:
                 for problem in error.problems:
                     shown = float(value) if isinstance(value, Fraction) else value
@@ -229,7 +229,7 @@ def _check_draws(study: Study, scene: Scene, file: SceneFile) -> None:
                     break
 
 
-def _extreme_values(draw: Draw, study: Study) -> list[Any]:
+def _extreme_draws(draw: Draw, study: Study) -> list[Any]:
     """Return the values of a draw that show whether it is allowed.
 
     Those of a normal distribution have no ends: a replica that draws too far out fails by itself.
@@ -265,7 +265,7 @@ def _tables_read(study: Study, scene: Scene) -> set[str]:
     return tables
 
 
-def one_per_value(study: Study) -> list[int]:
+def cells_covering_values(study: Study) -> list[int]:
     """Return cells that together hold every value of every axis; the first cell comes first."""
     wanted = [(0,) * len(study.axes)]
     for position, axis in enumerate(study.axes):
@@ -274,7 +274,7 @@ def one_per_value(study: Study) -> list[int]:
     return [study.cell_at(indices) for indices in wanted]
 
 
-def _different(scenes: list[Scene]) -> list[Scene]:
+def _scenes_by_block_types(scenes: list[Scene]) -> list[Scene]:
     """Return one scene for every set of block types."""
     by_types: dict[tuple[Any, ...], Scene] = {}
     for scene in scenes:
@@ -282,7 +282,7 @@ def _different(scenes: list[Scene]) -> list[Scene]:
     return list(by_types.values())
 
 
-def _types(scene: Scene, other: Scene) -> str:
+def _differing_types_text(scene: Scene, other: Scene) -> str:
     return ", ".join(
         f"{name} = {block.type_name}"
         for name, block in scene.blocks.items()

@@ -10,18 +10,18 @@ from pydantic import ValidationError
 
 from dsa_des.block.component import SourcedText
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.source_file import absolute
+from dsa_des.block.source_file import absolute_type_name
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS
 from dsa_des.results.record import Requirement, StopWhen
 from dsa_des.scene.checks import check_lookalikes, read_table
 from dsa_des.scene.examples import find_example
-from dsa_des.scene.keys import Key, flat
+from dsa_des.scene.keys import Key, flatten_tables
 from dsa_des.scene.overrides import SWAP, apply_sets, read_sets
-from dsa_des.scene.parameter_errors import explain
+from dsa_des.scene.parameter_errors import explain_validation_error
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
-from dsa_des.studies.axes import Axis, flatten_axes, label_of, parse_axis
+from dsa_des.studies.axes import Axis, axis_value_label, flatten_axes, parse_axis
 from dsa_des.studies.draws import Draw, flatten_draws, parse_draw
 from dsa_des.studies.metric import METRICS, find_metric
 from dsa_des.studies.splitting import Splitting
@@ -182,12 +182,14 @@ class _StudyReader:
         try:
             keys = StudyKeys.model_validate(self.data)
         except ValidationError as error:
-            self.file.problems += explain(self.file, (), "a study", StudyKeys, error)
+            self.file.problems += explain_validation_error(
+                self.file, (), "a study", StudyKeys, error
+            )
             wrong = {item["loc"][0] for item in error.errors(include_url=False)}
             sound = {key: value for key, value in self.data.items() if key not in wrong}
             keys = StudyKeys.model_validate(sound)
         check_lookalikes(self.file, (), self.data, keys)
-        for key, value in flat(keys.set).items():
+        for key, value in flatten_tables(keys.set).items():
             if key.startswith(SWAP):
                 self.file.report(
                     ("set", key), f"types are changed in [swap]: {key[5:]} = ...", value
@@ -195,12 +197,12 @@ class _StudyReader:
         return keys
 
     def sets(self) -> tuple[tuple[str, Any], ...]:
-        values = {k: v for k, v in flat(self.keys.set).items() if not k.startswith(SWAP)}
+        values = {k: v for k, v in flatten_tables(self.keys.set).items() if not k.startswith(SWAP)}
         return (*self._sets, *values.items())
 
     def swaps(self) -> tuple[tuple[str, str], ...]:
         named = [
-            (block, str(absolute(name)) if isinstance(name, str) else str(name))
+            (block, str(absolute_type_name(name)) if isinstance(name, str) else str(name))
             for block, name in self.keys.swap.items()
         ]
         return (*self._swaps, *named)
@@ -295,7 +297,7 @@ class _StudyReader:
         wanted = table.baseline
         try:
             known_so = wanted in axis.labels and not isinstance(wanted, bool)
-            label = wanted if known_so else label_of(wanted)
+            label = wanted if known_so else axis_value_label(wanted)
         except ValueError:
             label = wanted
         if label not in axis.labels:
@@ -338,7 +340,7 @@ class _StudyReader:
                 )
                 continue
             keys = {name: value for name, value in table.items() if name != "metric"}
-            name = absolute(table["metric"])
+            name = absolute_type_name(table["metric"])
             try:
                 model = find_metric(name).Parameters
             except ValueError as error:

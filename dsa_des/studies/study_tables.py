@@ -29,18 +29,19 @@ def resolve_tables(
 ) -> dict[str, Any]:
     """Return a study's tables with absolute paths, and further swap axes."""
     tables = {
-        key: value if key in _NAMING_RESULTS else _absolute(value) for key, value in data.items()
+        key: value if key in _NAMING_RESULTS else _make_paths_absolute(value)
+        for key, value in data.items()
     }
     for block, types in swaps:
         tables.setdefault("axes", {})[f"swap.{block}"] = types
     return tables
 
 
-def _absolute(value: Any, key: str = "") -> Any:
+def _make_paths_absolute(value: Any, key: str = "") -> Any:
     if isinstance(value, Mapping):
-        return {name: _absolute(item, str(name)) for name, item in value.items()}
+        return {name: _make_paths_absolute(item, str(name)) for name, item in value.items()}
     if isinstance(value, list):
-        return [_absolute(item, key) for item in value]
+        return [_make_paths_absolute(item, key) for item in value]
     if isinstance(value, SourcedText) and hasattr(value, "folder"):
         if key == _PATTERNS and any(sign in value for sign in "*?["):
             try:

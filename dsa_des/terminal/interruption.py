@@ -36,7 +36,7 @@ def plain_ending() -> Iterator[None]:
         raise KeyboardInterrupt if number == signal.SIGINT else Terminated(number)
 
     usual = (signal.SIG_DFL, signal.default_int_handler)
-    with _handling(handle, lambda handler: handler in usual):
+    with _install_handler(handle, lambda handler: handler in usual):
         try:
             yield
         except BaseException as error:
@@ -47,13 +47,13 @@ def plain_ending() -> Iterator[None]:
             code = _OFFSET + received[0]
             said = isinstance(error, SystemExit) and error.code in [_OFFSET + n for n in _SIGNALS]
             if not said:
-                _say("interrupted" if received[0] == signal.SIGINT else "terminated")
+                _print_signal_line("interrupted" if received[0] == signal.SIGINT else "terminated")
             raise SystemExit(code) from None
         if received:  # and something swallowed the exception
             raise SystemExit(_OFFSET + received[0])
 
 
-def _say(what: str) -> None:
+def _print_signal_line(what: str) -> None:
     with suppress(OSError, ValueError):  # its reader is gone
         from dsa_des.terminal.terminal import say
 
@@ -74,7 +74,7 @@ def defer_signals() -> Iterator[None]:
         arrived.append(number)
 
     try:
-        with _handling(note, lambda handler: handler is not signal.SIG_IGN):
+        with _install_handler(note, lambda handler: handler is not signal.SIG_IGN):
             yield
     finally:
         if arrived:
@@ -82,7 +82,7 @@ def defer_signals() -> Iterator[None]:
 
 
 @contextmanager
-def _handling(handler: Any, replaces: Any) -> Iterator[None]:
+def _install_handler(handler: Any, replaces: Any) -> Iterator[None]:
     """Handle our signals with `handler` where `replaces` says so of the handler there is."""
     before: dict[int, Any] = {}
     try:

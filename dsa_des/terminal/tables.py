@@ -77,7 +77,7 @@ def _print_rows(
     right: Collection[int] = (),
     below: Sequence[str] = (),
 ) -> None:
-    layout = _layout(names, cells, console.width)
+    layout = _column_widths(names, cells, console.width)
     if not layout[0]:
         _print_lists(console, names, cells)
         return
@@ -124,17 +124,18 @@ def _print(console: Any, text: str = "", style: str = "") -> None:
 
 def fold(text: str, width: int) -> list[str]:
     """Return a text in lines of at most `width`, folded where its words end if they are short."""
-    if _length(text) <= width:
+    if _visible_length(text) <= width:
         return [text]
     lines = [""]
     for piece in filter(None, _PIECES.findall(text)):
-        if _length(lines[-1] + piece.rstrip()) <= width:
+        if _visible_length(lines[-1] + piece.rstrip()) <= width:
             lines[-1] += piece
             continue
         if lines[-1]:
             lines.append("")
-        while _length(piece.rstrip()) > width:
-            cut = max(1, next((k for k in range(1, len(piece)) if _length(piece[: k + 1]) > width),
+        while _visible_length(piece.rstrip()) > width:
+            cut = max(1, next((k for k in range(1,
+            len(piece)) if _visible_length(piece[: k + 1]) > width),
                               len(piece)))  # fmt: skip
             lines[-1] = piece[:cut]
             lines.append("")
@@ -143,14 +144,14 @@ def fold(text: str, width: int) -> list[str]:
     return [line.rstrip() for line in lines if line.strip()] or [""]
 
 
-def _length(text: str) -> int:
+def _visible_length(text: str) -> int:
     from rich.cells import cell_len
 
     return cell_len(text)
 
 
 def _pad(text: str, width: int, right: bool) -> str:
-    blanks = " " * (width - _length(text))
+    blanks = " " * (width - _visible_length(text))
     return blanks + text if right else text + blanks
 
 
@@ -160,21 +161,23 @@ def _total_width(widths: Sequence[int], gap: int = _GAP) -> int:
 
 def _natural_widths(names: list[str], cells: list[list[str]]) -> list[int]:
     every = [names, *cells]
-    return [max(_length(row[k]) for row in every) for k in range(len(names))]
+    return [max(_visible_length(row[k]) for row in every) for k in range(len(names))]
 
 
-def _layout(names: list[str], cells: list[list[str]], most: int) -> _Layout:
+def _column_widths(names: list[str], cells: list[list[str]], most: int) -> _Layout:
     """Return the width of each column and of the gaps; no widths where nothing fits."""
     widths = _natural_widths(names, cells)
-    of_cells = [max((_length(row[k]) for row in cells), default=0) for k in range(len(names))]
+    of_cells = [
+        max((_visible_length(row[k]) for row in cells), default=0) for k in range(len(names))
+    ]
     of_words = [
-        max((_length(piece.rstrip()) for piece in _PIECES.findall(name)), default=0)
+        max((_visible_length(piece.rstrip()) for piece in _PIECES.findall(name)), default=0)
         for name in names
     ]
     least = [max(one, other) for one, other in zip(of_cells, of_words, strict=True)]
     narrow = [max(min(one, _LEAST), other) for one, other in zip(of_cells, of_words, strict=True)]
     # The first column names the row: its words are cut last, where all others are not enough.
-    words = [_length(word) for row in cells if row for word in row[0].split()]
+    words = [_visible_length(word) for row in cells if row for word in row[0].split()]
     named = [max([of_words[0], *words]), *narrow[1:]] if narrow else []
     for floors, gap in ((least, _GAP), (least, 1), (named, 1), (narrow, 1)):
         while _total_width(widths, gap) > most:

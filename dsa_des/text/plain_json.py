@@ -8,16 +8,16 @@ from typing import Any
 
 def json_text(content: Any, *, digits: int = 17, **options: Any) -> str:
     """Return content as JSON text, floats to so many digits; NaN and infinities become null."""
-    return json.dumps(_plain(content, digits), allow_nan=False, **options)
+    return json.dumps(_json_value(content, digits), allow_nan=False, **options)
 
 
-def _plain(value: Any, digits: int) -> Any:
+def _json_value(value: Any, digits: int) -> Any:
     if isinstance(value, float):
         if not math.isfinite(value):
             return None
         return value if digits == 17 else float(f"{value:.{digits}g}")
     if isinstance(value, Mapping):
-        return {key: _plain(item, digits) for key, item in value.items()}
+        return {key: _json_value(item, digits) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item, digits) for item in value]
+        return [_json_value(item, digits) for item in value]
     return value

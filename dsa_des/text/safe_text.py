@@ -25,7 +25,7 @@ def printable(text: object, *, lines: bool = False) -> str:
     if plain.isprintable():
         return plain
     return "".join(
-        letter if letter.isprintable() or (lines and letter == "\n") else _escape(letter)
+        letter if letter.isprintable() or (lines and letter == "\n") else _escape_character(letter)
         for letter in plain
     )
 
@@ -48,7 +48,7 @@ def _text_of(text: object) -> str:
         return f"<{type(text).__name__}>"
 
 
-def _escape(letter: str) -> str:
+def _escape_character(letter: str) -> str:
     code = ord(letter)
     if letter in "\n\r\t":
         return {"\n": r"\n", "\r": r"\r", "\t": r"\t"}[letter]
@@ -59,10 +59,10 @@ def _escape(letter: str) -> str:
 
 def shell_line(words: Iterable[str]) -> str:
     """Return words as a line that a shell reads back as the same words."""
-    return " ".join(map(_quote, words))
+    return " ".join(map(_quote_for_shell, words))
 
 
-def _quote(word: str) -> str:
+def _quote_for_shell(word: str) -> str:
     """Return a word as a shell reads it back; one that cannot be shown, with escapes."""
     if word.isprintable():
         return shlex.quote(word)

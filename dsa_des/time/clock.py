@@ -64,13 +64,13 @@ def _has_too_many_digits(text: str) -> bool:
     )
 
 
-def resolution(times_s: Iterable[Fraction]) -> int:
+def common_ticks_per_second(times_s: Iterable[Fraction]) -> int:
     """Return the ticks per second in which all given times are whole: lcm(10^9, denominators)."""
     return math.lcm(NANOSECONDS, *(time.denominator for time in times_s))
 
 
 def nanosecond_of(ticks: IntArray, ticks_per_s: int) -> IntArray:
-    """Return the whole nanoseconds at ticks of any `resolution`, as keys of draws.
+    """Return the whole nanoseconds at ticks of any `common_ticks_per_second`, as keys of draws.
 
     A block more or less in a scene may change the resolution; what an instant draws must not.
     """

@@ -70,7 +70,7 @@ class GaussMarkov:
         halvings = max(0, math.ceil(math.log2(_APART * tau_ns)))
         #: Two halvings a step: knots are 4**steps ns apart.
         self._steps = (halvings + 1) // 2
-        self._bridges = [_bridge(4**step / tau_ns) for step in range(self._steps + 1)]
+        self._bridges = [_bridge_weights(4**step / tau_ns) for step in range(self._steps + 1)]
 
     def __call__(
         self,
@@ -148,7 +148,7 @@ class GaussMarkov:
         return left
 
 
-def _bridge(length: float) -> tuple[tuple[float, float], tuple[float, float]]:
+def _bridge_weights(length: float) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return weight of the ends and spread half-way, of an interval in correlation times."""
     halves = length / 2.0, length / 4.0
     first, second = ((0.5 / math.cosh(s), math.sqrt(math.tanh(s))) for s in halves)

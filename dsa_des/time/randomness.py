@@ -119,7 +119,7 @@ class BranchedSeed(int):
         return int(self), self.branches
 
 
-def branch(seed: int, from_ns: int, other: int) -> BranchedSeed:
+def branch_seed(seed: int, from_ns: int, other: int) -> BranchedSeed:
     """Return the seed of a run that draws as `seed` up to an instant, and then by another."""
     before = [one for one in getattr(seed, "branches", ()) if one[0] < from_ns]
     return BranchedSeed(int(seed), [*before, (from_ns, other)])
@@ -273,8 +273,8 @@ class Stream:
         draw) use either these or the others.
         """
         w0, w1, w2, w3 = self._words(targets, scans, draw)
-        radius, angle = _radius(w0), w1 * (2.0**-32 * 2.0 * np.pi)
-        third = _radius(w2) * np.cos(w3 * (2.0**-32 * 2.0 * np.pi))
+        radius, angle = _box_muller_radius(w0), w1 * (2.0**-32 * 2.0 * np.pi)
+        third = _box_muller_radius(w2) * np.cos(w3 * (2.0**-32 * 2.0 * np.pi))
         return radius * np.cos(angle), radius * np.sin(angle), third
 
 
@@ -289,7 +289,7 @@ class _RunStream(Stream):
         self._keys, self._round_keys = _KNOWN, round_keys
 
 
-def _radius(word: UInt64Array) -> FloatArray:
+def _box_muller_radius(word: UInt64Array) -> FloatArray:
     """Return Box and Muller's radius from 32 bits; 1 is added, so that the logarithm is finite."""
     radius: FloatArray = np.sqrt(-2.0 * np.log((word + 1.0) * 2.0**-32))
     return radius

@@ -14,7 +14,7 @@ import dsa_des
 from components.display.terminal import show
 from dsa_des.cli import main
 from dsa_des.record.failure_counts import add_counts, failure_sentences
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
 from dsa_des.terminal.terminal import text_of
@@ -114,7 +114,9 @@ def test_what_has_no_range_is_counted(tmp_path: Path, tracker: str | None, sourc
     # In lock step each run counts, as often as by itself: of a shared block and of a split one.
     for change in ({}, {"blocks.alerting.fit_s": 2.0}):
         scenes = replicas_of(dsa_des.load_scene(eyes), {}, change)
-        assert lock_step(scenes).run().failure_counts == add_counts(map(failure_counts, scenes))
+        assert make_lockstep_simulation(scenes).run().failure_counts == add_counts(
+            map(failure_counts, scenes)
+        )
 
 
 def test_a_block_that_nothing_wakes_is_named(tmp_path: Path) -> None:
@@ -126,7 +128,7 @@ def test_a_block_that_nothing_wakes_is_named(tmp_path: Path) -> None:
     found = failure_counts(late)["filter"]
     assert found == {"it never ran, for nothing came at alerts": (1, 1)}
     loaded = dsa_des.load_scene(late)
-    assert lock_step(replicas_of(loaded, {}, {})).run().failure_counts["filter"] == {
+    assert make_lockstep_simulation(replicas_of(loaded, {}, {})).run().failure_counts["filter"] == {
         "it never ran, for nothing came at alerts": (2, 2)
     }
 

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pytest
 from scipy import stats
 
-from dsa_des.answers.changes import PairedChange, changes_by_model, confidence_of_each
+from dsa_des.answers.changes import PairedChange, changes_by_model, confidence_per_interval
 from dsa_des.results.record import EVENT, NUMBER, RATIO, RatioOf, Result
 from tests.results.conftest import rows_of_table
 
@@ -55,7 +55,7 @@ def test_means_are_compared_by_student_s_t_of_the_differences() -> None:
         # The scene's own interval stays that of the study.
         t = stats.t.ppf(0.975, 29) * own.std(ddof=1) / math.sqrt(30)
         assert change.own.high - change.own.value == pytest.approx(t)
-    assert confidence_of_each(0.95, 12) == pytest.approx(1.0 - 0.05 / 12)
+    assert confidence_per_interval(0.95, 12) == pytest.approx(1.0 - 0.05 / 12)
 
 
 def test_who_has_a_value_on_one_side_only_is_counted() -> None:

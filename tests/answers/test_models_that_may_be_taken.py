@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from dsa_des.answers.changes import PairedChange, confidence_of_each
+from dsa_des.answers.changes import PairedChange, confidence_per_interval
 from dsa_des.answers.verdicts import (
     BEYOND,
     NOTHING,
@@ -13,12 +13,12 @@ from dsa_des.answers.verdicts import (
     SAME,
     WITHIN,
     Limit,
-    mark_front,
+    is_on_cost_front,
+    judge_model,
     parse_limits,
-    verdict_of,
 )
 from dsa_des.errors import UsageError
-from dsa_des.results.differences import difference, quantile_difference
+from dsa_des.results.differences import estimate_difference, quantile_difference
 from dsa_des.results.record import EVENT, NUMBER, RATIO, RatioOf, Result
 from dsa_des.results.statistics import Estimate
 
@@ -42,7 +42,7 @@ HUNDRED = Limit(100.0, False)
 
 
 def kind_of(*changes, limit=HUNDRED, result=RANGE):
-    return verdict_of("other", result, changes, limit, "")
+    return judge_model("other", result, changes, limit, "")
 
 
 @pytest.mark.parametrize(
@@ -121,17 +121,17 @@ def test_what_cannot_be_compared_says_why():
     nothing = change(math.nan, math.nan, reason="no encounter has a nominal event")
     assert kind_of(nothing).kind == NOTHING
     assert kind_of(nothing).reason == "no encounter has a nominal event"
-    assert verdict_of("other", RANGE, [], Limit(1.0, False), "it broke").reason == "it broke"
+    assert judge_model("other", RANGE, [], Limit(1.0, False), "it broke").reason == "it broke"
 
 
 def test_the_front_holds_what_is_cheaper_or_surely_nearer():
     verdicts = [
-        verdict_of(name, RANGE, [change(-size, size, value=0.0)], Limit(100.0, False), "")
+        judge_model(name, RANGE, [change(-size, size, value=0.0)], Limit(100.0, False), "")
         for name, size in (("cheap", 80.0), ("cheaper", 20.0), ("near", 5.0), ("dear", 1.0))
     ]
     costs = {"cheap": 0.5, "cheaper": 0.4, "near": 0.8, "dear": 1.05}
     # The scene as it is changes nothing and costs as much as the last one.
-    assert mark_front(verdicts, costs) == [False, True, True, False]
+    assert is_on_cost_front(verdicts, costs) == [False, True, True, False]
 
 
 def test_limits_have_the_unit_of_a_result_or_are_shares():
@@ -148,12 +148,12 @@ def test_limits_have_the_unit_of_a_result_or_are_shares():
 def test_a_model_that_changes_as_much_as_the_limit_is_seldom_taken():
     """Of ten models whose true change is the limit, one or more is taken in at most 1 of 20."""
     rng, taken, repeats = np.random.default_rng(1), 0, 300
-    each = confidence_of_each(0.95, 10)
+    each = confidence_per_interval(0.95, 10)
     for _ in range(repeats):
         own = rng.normal(1000.0, 50.0, 40)
         some = []
         for _ in range(10):
-            found = difference(own, own + rng.normal(10.0, 5.0, 40), each).paired
+            found = estimate_difference(own, own + rng.normal(10.0, 5.0, 40), each).paired
             some.append(kind_of(change(found.low, found.high), limit=Limit(10.0, False)).kind)
         taken += WITHIN in some
     assert taken / repeats < 0.05 + 3 * math.sqrt(0.05 * 0.95 / repeats)

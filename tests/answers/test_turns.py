@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from dsa_des.answers.alternatives import Alternative, with_models
-from dsa_des.answers.models_in_turns import TurnTimes, turns_of
+from dsa_des.answers.alternatives import Alternative, add_model_axis
+from dsa_des.answers.models_in_turns import TurnTimes, split_into_turns
 from dsa_des.studies.study_file import read_study
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -26,7 +26,7 @@ blocks.radar.scan_rate_hz = [1, 2]
 def study_of(folder, replicas, chunk, over=""):
     path = folder / "study.toml"
     path.write_text(LIST.format(replicas=replicas, chunk=chunk, over=over))
-    return with_models(read_study(path), [Alternative("other", (("title", "another"),))])
+    return add_model_axis(read_study(path), [Alternative("other", (("title", "another"),))])
 
 
 @pytest.mark.parametrize(
@@ -43,7 +43,7 @@ def study_of(folder, replicas, chunk, over=""):
 )
 def test_all_runs_are_in_one_turn(tmp_path, replicas, chunk, many, over, turns):
     study = study_of(tmp_path, replicas, chunk, over)
-    batches = turns_of(study, many)
+    batches = split_into_turns(study, many)
     assert len(batches) == turns
     runs = Counter((cell, k) for batch in batches for cell, start, end in batch
                    for k in range(start, end))  # fmt: skip
@@ -55,7 +55,7 @@ def test_all_runs_are_in_one_turn(tmp_path, replicas, chunk, many, over, turns):
 def test_members_of_a_sample_are_kept_whole(tmp_path):
     """Both scan rates meet an encounter in the same turn."""
     study = study_of(tmp_path, 2, 4, "'traffic.intruders[0].north_m'")
-    for batch in turns_of(study):
+    for batch in split_into_turns(study):
         cells = {cell for cell, _, _ in batch}
         assert {cell + 7 if cell < 7 else cell - 7 for cell in cells} == cells
 

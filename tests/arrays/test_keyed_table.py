@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dsa_des.arrays.keyed_table import KeyedTable, turns
+from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
 
 
 def a_table(rows):
@@ -61,4 +61,6 @@ def test_things_are_put_in_order_of_runs_and_keep_their_order_within():
     [([], []), ([4], [[0]]), ([7, 2, 7, 7, 2], [[0, 1], [2, 4], [3]]), ([1, 1], [[0], [1]])],
 )
 def test_every_key_has_its_turn(keys, expected):
-    assert [rows.tolist() for rows in turns(np.array(keys, dtype=np.int64))] == expected
+    assert [
+        rows.tolist() for rows in occurrences_by_turn(np.array(keys, dtype=np.int64))
+    ] == expected

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 
 from dsa_des.arrays.run_ticks import (
     RunTicks,
-    first_of_run,
+    first_position_in_run,
     is_single_run,
-    last_of_run,
-    next_of_run,
-    ranks,
+    last_position_in_run,
+    next_position_in_run,
+    rank_instants,
     runs_of_single,
-    union,
+    union_of_instants,
 )
 
 FAR = 2**61
@@ -33,7 +33,7 @@ def as_list(instants):
 @settings(derandomize=True, deadline=None, max_examples=200)
 @given(known=pairs.map(sorted), asked=pairs.map(sorted), scale=scales)
 def test_the_last_of_its_own_run(known, asked, scale):
-    rows = last_of_run(of(known, scale), of(asked, scale))
+    rows = last_position_in_run(of(known, scale), of(asked, scale))
     for (run, tick), row in zip(asked, rows.tolist(), strict=True):
         there = [k for k, (other, t) in enumerate(known) if other == run and t <= tick]
         assert row == (there[-1] if there else -1)
@@ -43,9 +43,9 @@ def test_the_last_of_its_own_run(known, asked, scale):
 @given(known=pairs.map(sorted), asked=pairs, scale=scales)
 def test_the_first_at_or_after(known, asked, scale):
     instants = of(known, scale)
-    rows = next_of_run(instants, of(asked, scale))
+    rows = next_position_in_run(instants, of(asked, scale))
     assert rows.tolist() == [sum(one < pair for one in known) for pair in asked]
-    of_run = first_of_run(instants, np.array([run for run, _ in asked], dtype=np.int64))
+    of_run = first_position_in_run(instants, np.array([run for run, _ in asked], dtype=np.int64))
     assert of_run.tolist() == [sum(one[0] < run for one in known) for run, _ in asked]
     assert [instants.count_before(run, tick * scale) for run, tick in asked] == rows.tolist()
 
@@ -54,7 +54,7 @@ def test_the_first_at_or_after(known, asked, scale):
 @given(parts=st.lists(pairs, min_size=1, max_size=3), scale=scales)
 def test_union_order_and_ranks(parts, scale):
     every = sorted({pair for part in parts for pair in part})
-    united = union([of(sorted(part), scale) for part in parts])
+    united = union_of_instants([of(sorted(part), scale) for part in parts])
     assert as_list(united) == as_list(of(every, scale))
     for part in parts:
         instants = of(part, scale)
@@ -62,7 +62,7 @@ def test_union_order_and_ranks(parts, scale):
         assert as_list(instants if order is None else instants.take(order)) == as_list(
             of(sorted(part), scale)
         )
-    found, count = ranks(*(of(part, scale) for part in parts))
+    found, count = rank_instants(*(of(part, scale) for part in parts))
     assert count == len(every)
     wanted = [[every.index(pair) for pair in part] for part in parts]
     assert [rank.tolist() for rank in found] == wanted

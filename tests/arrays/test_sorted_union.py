@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from dsa_des.arrays.run_ticks import RunTicks, last_of_run, positions_among, runs_of_single, union
+from dsa_des.arrays.run_ticks import (
+    RunTicks,
+    last_position_in_run,
+    positions_among,
+    runs_of_single,
+    union_of_instants,
+)
 from dsa_des.arrays.sorted_union import sorted_union
 
 
@@ -36,18 +42,20 @@ def test_a_union_knows_its_parts_and_no_others(runs: int) -> None:
             order = np.lexsort((tick, run))
             known = RunTicks(runs_of_single(40) if runs == 1 else run, tick[order])
             parts.append(known)
-        every = union(parts)
+        every = union_of_instants(parts)
         pairs = list(zip(every.run.tolist(), every.tick.tolist(), strict=True))
-        assert union(parts[::-1]) is every
-        assert union(parts[:2]) is not every
+        assert union_of_instants(parts[::-1]) is every
+        assert union_of_instants(parts[:2]) is not every
         for part in parts:
             # Equal to the part, but not the same: it is searched for.
             twin = RunTicks(part.run, part.tick.copy())
             asked = list(zip(part.run.tolist(), part.tick.tolist(), strict=True))
             for instants in (part, twin):
-                assert last_of_run(every, instants).tolist() == [pairs.index(p) for p in asked]
+                assert last_position_in_run(every, instants).tolist() == [
+                    pairs.index(p) for p in asked
+                ]
                 place, there = positions_among(every, instants)
                 assert there is None
                 assert [pairs[row] for row in place.tolist()] == asked
         with pytest.raises(ValueError, match="read-only"):
-            last_of_run(every, parts[0])[0] = 7  # the next who asks is given the same
+            last_position_in_run(every, parts[0])[0] = 7  # the next who asks is given the same

@@ -49,6 +49,47 @@ def head_on(addresses=(None, None), told=None, seed=1, offset_s=0, below=None, *
     )  # fmt: skip
 
 
+def three(duration_s=8, **told):
+    """Return the ownship (2) head on with b (1), and c (3), which crosses the ownship's way later.
+
+    b and c pass 1.7 km from each other, and neither is in the other's way.
+    """
+    tables = head_on((2, 1), told).resolved()
+    blocks, wires = tables["blocks"], tables["wires"]
+    place = {"north_m": 6000, "east_m": 0}, {"north_m": 4200, "east_m": -4200}
+    blocks["traffic"]["intruders"] = [
+        {"up_m": 0, "speed_mps": 60, "name": name, "heading_deg": heading_deg, **at}
+        for name, heading_deg, at in zip("bc", (180, 90), place, strict=True)
+    ]
+    blocks["alerting_c"] = {**blocks["alerting_b"], "platform": "c"}
+    blocks["avoidance_c"] = {**blocks["avoidance_b"], "address": 3}
+    steers = {"from": "avoidance_c.manoeuvres", "to": "traffic", "delay_s": 5, "holds": "nothing"}
+    wires += ["traffic -> alerting_c -> avoidance_c", steers]
+    wires += [
+        {
+            "from": f"avoidance{one}.sides",
+            "to": f"avoidance{other}.told",
+            "holds": "nothing",
+            **told,
+        }
+        for one, other in (("_c", ""), ("_c", "_b"), ("", "_c"), ("_b", "_c"))
+    ]
+    return dsa_des.load_scene(tables | {"duration_s": duration_s})
+
+
+def test_a_side_binds_only_whom_it_is_meant_for():
+    """b descends, so the ownship climbs; c, whose conflict is with the ownship alone, descends."""
+    scene = three(delay_s=0.5)
+    last = {row["block"]: np.sign(row["climb_m"])
+            for row in tables_of(scene)[1]["manoeuvres"].to_pylist()}  # fmt: skip
+    assert last == {"avoidance": 1.0, "avoidance_b": -1.0, "avoidance_c": -1.0}
+    sides = tables_of(scene)[1]["sides"].to_pylist()
+    told = {(row["address"], row["meant_for"]) for row in sides}
+    assert told == {(1, 2), (2, 1), (2, 3), (3, 2)}
+    # One for each of two at one instant.
+    assert len(sides) == len({(row["time_s"], row["address"], row["meant_for"]) for row in sides})
+
+
 def climbs(scene):
     found = {"avoidance": [], "avoidance_b": []}
     for row in tables_of(scene)[1]["manoeuvres"].to_pylist():
@@ -120,5 +161,5 @@ def test_two_with_one_address_are_refused():
 
 
 def test_the_same_in_any_window_and_beside_others():
-    same_in_any_window(head_on((1, 2), {"delay_s": 0.5, "drop_probability": 0.4}))
-    same_as_alone(replicas_of(head_on((1, 2), {"delay_s": 0.5}), {}, {}))
+    same_in_any_window(three(20, delay_s=0.5, drop_probability=0.4))
+    same_as_alone(replicas_of(three(20, delay_s=0.5), {}, {}))

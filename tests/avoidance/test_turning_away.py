@@ -7,7 +7,7 @@ import pytest
 from covering import covers
 from wired import chain, rows, run, sensor
 
-from components.avoidance import TurnAwayParameters
+from components.turning_away import TurnAwayParameters
 
 TRACKER = {"type": "tracking.stub"}
 

@@ -43,9 +43,9 @@ def test_yardstick_finds_the_same(case):
 def test_the_replicas_of_the_benchmark_run_together_and_share_their_blocks():
     """With other phases of three clocks; no truth is recorded of so many."""
     from components.benchmark.scenes import replicas_of, scene_of, select_cases
-    from dsa_des.replicas.lockstep import lock_step
+    from dsa_des.replicas.lockstep import make_lockstep_simulation
 
     (case,) = select_cases(["monte_carlo"])
     scene = scene_of(case, quick=False, duration_s="2")
-    simulation = lock_step(replicas_of(scene, 3))
+    simulation = make_lockstep_simulation(replicas_of(scene, 3))
     assert not simulation.timeline.split

@@ -14,7 +14,7 @@ from components.radar.weather import SNR
 from dsa_des.block.component import Context
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.registry import find
+from dsa_des.block.registry import find_component
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.errors.problems import BlockFailure
@@ -122,7 +122,7 @@ def test_a_block_that_asks_for_an_undeclared_hook_is_told_so():
 
 @pytest.mark.parametrize("name", entry_points_of())
 def test_every_effect_of_a_registered_block_acts_on_a_hook(name):
-    cls = find(name)
+    cls = find_component(name)
     assert {effect.acts_on for effect in cls.effects} <= set(cls.all_hooks())
     assert all(isinstance(effect.acts_on, Hook) for effect in cls.effects)
 

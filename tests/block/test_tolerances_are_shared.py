@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from dsa_des.block.effect import Effect, Verdict
-from dsa_des.running.effects import plan, remaining_tolerance
+from dsa_des.running.effects import plan_effects, remaining_tolerance
 
 
 class _Bounded(Effect):
@@ -43,7 +43,7 @@ FOUR = (
 )  # fmt: skip
 def test_bounds_together_stay_within_the_tolerance(allowed, names):
     """An allowance that two bounds fill exactly is one for the two."""
-    planned = plan(block(*FOUR), {"pd": allowed + 1e-12})
+    planned = plan_effects(block(*FOUR), {"pd": allowed + 1e-12})
     assert left_out(planned) == names
     spent = sum({"large": 0.06, "small": 0.02, "middle": 0.03}[name] for name in names)
     left = remaining_tolerance(planned, {"pd": allowed, "angle": 1.0})
@@ -52,12 +52,12 @@ def test_bounds_together_stay_within_the_tolerance(allowed, names):
 
 def test_a_bound_of_two_quantities_needs_both():
     both = block(_Bounded("both", pd=0.01, angle=0.1))
-    assert not left_out(plan(both, {"pd": 0.02}))
-    assert not left_out(plan(both, {"pd": 0.02, "angle": 0.05}))
-    assert left_out(plan(both, {"pd": 0.02, "angle": 0.2})) == {"both"}
+    assert not left_out(plan_effects(both, {"pd": 0.02}))
+    assert not left_out(plan_effects(both, {"pd": 0.02, "angle": 0.05}))
+    assert left_out(plan_effects(both, {"pd": 0.02, "angle": 0.2})) == {"both"}
 
 
 def test_without_a_tolerance_or_with_everything_none_is_left_out():
-    assert not left_out(plan(block(*FOUR), {}))
-    planned = plan(block(*FOUR), {"pd": 0.5}, everything=True)
+    assert not left_out(plan_effects(block(*FOUR), {}))
+    planned = plan_effects(block(*FOUR), {"pd": 0.5}, everything=True)
     assert all(item.built for item in planned)

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.registry import find
+from dsa_des.block.registry import find_component
 from dsa_des.cli import main
 from dsa_des.commands.scene import measured_shares
 from dsa_des.scene.scene import load_scene
@@ -91,7 +91,7 @@ def test_every_effect_that_is_not_neutral_says_why() -> None:
     silent = [
         effect.name
         for type_name in entry_points_of()
-        for effect in find(type_name).effects
+        for effect in find_component(type_name).effects
         if not effect.neutral and not effect.outside_the_proof
     ]
     assert silent == []

@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner, Result
 from pydantic import BaseModel
 
-from dsa_des.block.registry import find, section_models
+from dsa_des.block.registry import find_component, section_models
 from dsa_des.cli import main
 from dsa_des.files.toml_files import to_toml
 from dsa_des.scene.block_table import BlockOptions
@@ -81,7 +81,7 @@ def places() -> list[str]:
     for name, model in section_models().items():
         keys += [f"{name}.{key}" for key in text_keys(model)]
     for name in ("traffic.daa_file", "traffic.csv", "radar.swerling"):
-        keys += [f"blocks.own.{key}" for key in text_keys(find(name).Parameters)]
+        keys += [f"blocks.own.{key}" for key in text_keys(find_component(name).Parameters)]
     return list(dict.fromkeys(keys))
 
 

@@ -130,7 +130,7 @@ def test_a_study_that_is_stopped_says_how_to_go_on(
         ("dsa_des.commands.scene.load", ["run", "{scene}"]),
         ("dsa_des.running.recorded_run.to_toml", ["run", "{scene}", "--duration", "1"]),
         ("dsa_des.commands.scene.load", ["check", "{scene}"]),
-        ("dsa_des.commands.graph._layout", ["graph", "{scene}", "--png"]),
+        ("dsa_des.commands.graph._block_positions", ["graph", "{scene}", "--png"]),
         ("dsa_des.commands.scene.load", ["explain", "{scene}"]),
         ("dsa_des.commands.cost.climb", ["cost", "{scene}", "--block", "transform"]),
         ("dsa_des.commands.catalogue.show_components", ["components"]),

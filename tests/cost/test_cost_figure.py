@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.costs.climb import Comparison, RungCost
-from dsa_des.costs.cost_report import _cells, draw_costs, put_labels
+from dsa_des.costs.cost_report import _cost_cells, draw_costs, put_labels
 from dsa_des.costs.replay import Spread
 from dsa_des.record.drawing import keep_figures
 
@@ -63,6 +63,6 @@ def test_large_numbers_of_the_table_have_no_power_of_ten():
     cost = _costs("tracker")[0]
     cost.cpu_us_per_target_scan, cost.cpu_spread_us = 1236.4, 12.3
     cost.errors = {"detection_probability": Spread(2e-12, 999.7, 3e4, 9)}
-    assert _cells(cost, Comparison([]))[1:5] == ["1,240 ± 10", "2e-12", "1,000", "30,000"]
+    assert _cost_cells(cost, Comparison([]))[1:5] == ["1,240 ± 10", "2e-12", "1,000", "30,000"]
     cost.cpu_us_per_target_scan, cost.cpu_spread_us = 0.8644, 0.074
-    assert _cells(cost, Comparison([]))[1] == "0.864 ± 0.07"
+    assert _cost_cells(cost, Comparison([]))[1] == "0.864 ± 0.07"

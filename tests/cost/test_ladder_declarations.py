@@ -5,7 +5,7 @@ from click.testing import CliRunner
 
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.ladder import Ladder, Quantity, Rung
-from dsa_des.block.registry import find
+from dsa_des.block.registry import find_component
 from dsa_des.cli import main
 from dsa_des.costs.climb import is_on_front, parse_budgets
 from dsa_des.errors import UsageError
@@ -13,15 +13,15 @@ from dsa_des.errors import UsageError
 LADDERS = [
     pytest.param(name, ladder, id=f"{name}-{ladder.name}")
     for name in entry_points_of()
-    for ladder in find(name).ladders
+    for ladder in find_component(name).ladders
 ]
 
 
 @pytest.mark.parametrize(("type_name", "ladder"), LADDERS)
 def test_rungs_fill_the_same_contract(type_name, ladder):
-    mine = find(type_name)
+    mine = find_component(type_name)
     for rung in ladder.rungs:
-        cls = find(rung.type_name) if rung.type_name else mine
+        cls = find_component(rung.type_name) if rung.type_name else mine
         assert {p: i.message for p, i in cls.inputs.items()} == {
             p: i.message for p, i in mine.inputs.items()
         }
@@ -33,7 +33,7 @@ def test_rungs_fill_the_same_contract(type_name, ladder):
 
 
 def test_every_sensor_transform_and_fusion_has_a_ladder():
-    without = {name for name in entry_points_of() if not find(name).ladders}
+    without = {name for name in entry_points_of() if not find_component(name).ladders}
     without -= {"fusion.pass_through"}  # puts nothing together: there is nothing to be exact about
     assert without.isdisjoint({name for name in entry_points_of() if name.split(".")[0] in (
         "radar", "optical", "geometry", "fusion")})  # fmt: skip
@@ -60,7 +60,7 @@ def test_the_front_holds_what_nothing_beats():
 
 
 def test_budgets_are_numbers_with_a_unit_of_the_ladders():
-    ladders = [ladder for name in entry_points_of() for ladder in find(name).ladders]
+    ladders = [ladder for name in entry_points_of() for ladder in find_component(name).ladders]
     assert parse_budgets(["0.5mrad", "2 m", "1e-3pd", "1m2"], ladders) == {
         "mrad": 0.5, "m": 2.0, "Pd": 1e-3, "m²": 1.0}  # fmt: skip
     for wrong in ("mrad", "0mrad", "-1m", "1.2.3m", "1furlong", "nan m"):

@@ -7,7 +7,7 @@ import pytest
 import dsa_des
 from components.line_of_sight.transform import EARTH, REFRACTION
 from dsa_des.commands.cost import comparison
-from dsa_des.costs.climb import applies, climb
+from dsa_des.costs.climb import climb, inapplicable_reason
 from dsa_des.costs.variants import Variants
 
 
@@ -31,12 +31,12 @@ def test_straight_rays_err_by_the_bending(scene):
                 for range_m, elevation in _looks(variants)]  # fmt: skip
     assert max(expected) > 0.1
     assert straight.error.maximum == pytest.approx(max(expected), rel=1e-3)
-    assert applies(variants, "transform", REFRACTION) == ""
+    assert inapplicable_reason(variants, "transform", REFRACTION) == ""
 
 
 def test_it_is_left_out_where_rays_are_straight_and_the_earth_s_error_is_its_own(scene):
     variants = scene("")
-    assert "rays are straight" in applies(variants, "transform", REFRACTION)
+    assert "rays are straight" in inapplicable_reason(variants, "transform", REFRACTION)
     bent = scene('[terrain]\nrefraction = "four_thirds"\n')
     exact = climb(bent, "transform", EARTH, repeats=1, compare=comparison())[-1]
     assert exact.error_note == "nothing more exact is known of bent rays"

@@ -19,7 +19,7 @@ from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import Recorded
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
-from dsa_des.studies.metric import Group, columns_wanted, find_metric
+from dsa_des.studies.metric import Group, find_metric, needed_columns
 
 MODULE = "blocks_of_the_page"
 
@@ -229,7 +229,7 @@ def test_the_metric_counts_scans_of_every_replica(configs: Path) -> None:
         Recorded({"scans": {"tick": np.arange(n), "block": radar_rows(n)}}, 10**9, 6.0, dict)
         for n in (3, 0, 5)
     ]
-    group = Group(scene, [Replica(k) for k in range(3)], runs, columns_wanted([metric]))
+    group = Group(scene, [Replica(k) for k in range(3)], runs, needed_columns([metric]))
     found = metric.measure(group)
     assert [result.name for result in metric.results()] == list(found) == ["looks"]
     assert found["looks"].tolist() == [3.0, 0.0, 5.0]

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from dsa_des.block.shipped_files import folders
+from dsa_des.block.shipped_files import example_folders
 from dsa_des.evidence.case import read_case
 from dsa_des.scene.examples import find_input_file
 from tests.evidence.small_case import Made, made
@@ -104,7 +104,9 @@ def test_every_file_that_is_read_has_its_digest(case, pack):
     files = {name: case.parent / name for name in ("case.toml", "scene.toml", "slow.toml",
                                                    "study.toml")}  # fmt: skip
     for name in shipped:
-        (files[name],) = [folder / name for folder in folders() if (folder / name).is_file()]
+        (files[name],) = [
+            folder / name for folder in example_folders() if (folder / name).is_file()
+        ]
     digests = {name: hashlib.sha256(file.read_bytes()).hexdigest() for name, file in files.items()}
     assert {row["file"]: row["sha256"] for row in pack.evidence["inputs"]} == digests
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from dsa_des.evidence.case import CaseRequirement
-from dsa_des.evidence.findings import Convergence, Finding, first_line, running_counts
+from dsa_des.evidence.findings import Convergence, Finding, running_counts, verdict_line
 from dsa_des.results.statistics import Estimate
 
 
@@ -35,11 +35,11 @@ def test_an_interval_decides(limit, low, high, verdict):
 def test_what_does_not_pass_is_said_first():
     good, bad = finding("good", 0.1, 0.2, most=0.5), finding("bad", 0.6, 0.7, most=0.5)
     open_, moving = finding("open", 0.4, 0.6, most=0.5), finding("moving", 0.1, 0.2, 1.0, most=0.5)
-    line = first_line([good, bad, open_])
+    line = verdict_line([good, bad, open_])
     assert line.startswith("Does not pass: bad 0.65 (0.6 to 0.7), asked at most 0.5 u; open 0.5")
     assert line.index("bad") < line.index("open") < line.index("Passes: good")
-    assert first_line([good]).startswith("Passes: good 0.15 (0.1 to 0.2)")
-    nothing = first_line([good, moving, bad])
+    assert verdict_line([good]).startswith("Passes: good 0.15 (0.1 to 0.2)")
+    nothing = verdict_line([good, moving, bad])
     assert nothing.startswith(
         "No verdict: moving has not converged: over the encounters from 5 to 9"
     )

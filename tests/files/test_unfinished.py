@@ -54,7 +54,7 @@ def test_what_a_living_process_is_at_stays(tmp_path):
 
 def test_what_another_machine_is_at_stays(tmp_path, monkeypatch):
     killed(tmp_path)
-    monkeypatch.setattr(module, "_host", lambda: "somewhere else")
+    monkeypatch.setattr(module, "_host_name", lambda: "somewhere else")
     remove_abandoned(tmp_path)
     assert len(left_in(tmp_path)) == 1
     monkeypatch.undo()

@@ -161,14 +161,14 @@ def _simulate(argv: list[str]) -> None:
         from dsa_des.files.toml_files import to_toml
         from dsa_des.record.recording import Recorder
         from dsa_des.record.sinks import MemorySink, ObserverSink
-        from dsa_des.running.reports import load_reports, say_if_long
+        from dsa_des.running.reports import load_reports, warn_of_long_run
         from dsa_des.running.simulation import Simulation
         from dsa_des.text.plain_json import json_text
 
         loaded = load(scene, sets, swaps, options["seed"], options["duration"])  # type: ignore[arg-type]
         recorder = Recorder([MemorySink()])
         simulation = Simulation(loaded, recorder=recorder)
-        say_if_long(simulation)
+        warn_of_long_run(simulation)
         observers = ObserverSink(
             o for report in load_reports() for o in report.observers(simulation)
         )

@@ -9,7 +9,7 @@ from fuzz_cases import Case
 from fuzz_scenes import ADDITIONS, BASE, RANDOM_TRAFFIC, _merge, known_keys, place_of
 from pydantic import ValidationError
 
-from dsa_des.block.registry import find, section_models
+from dsa_des.block.registry import find_component, section_models
 from dsa_des.files.toml_files import to_toml
 from dsa_des.scene.block_table import split_options
 
@@ -93,8 +93,8 @@ def _fits(scene: dict[str, Any], path: tuple[str, ...]) -> bool:
     for part in path:
         table = table.get(part, {})
     if path[0] == "blocks":
-        _, own = split_options(table, find(table["type"]).Parameters)
-        model = find(table["type"]).Parameters
+        _, own = split_options(table, find_component(table["type"]).Parameters)
+        model = find_component(table["type"]).Parameters
     else:
         own, model = table, section_models()[path[0]]
     try:

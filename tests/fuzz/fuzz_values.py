@@ -74,6 +74,6 @@ def value(rng: random.Random, depth: int = 0) -> Any:
 
 def raw(rng: random.Random) -> str:
     """Return TOML for a value: well formed, or not."""
-    from dsa_des.files.toml_files import inline
+    from dsa_des.files.toml_files import inline_toml
 
-    return rng.choice(RAW) if rng.random() < 0.3 else inline(value(rng))
+    return rng.choice(RAW) if rng.random() < 0.3 else inline_toml(value(rng))

@@ -7,6 +7,7 @@ import pytest
 
 from components.guidance.mvp import _dense
 from components.guidance.potential import KeptApart, Others, conflicts, may_resume, push_velocity
+from components.messages.alerts import AlertLevels
 
 KEPT = KeptApart(50.0, 1.05, 120.0)
 
@@ -120,20 +121,22 @@ def test_far_ahead_and_past_are_no_conflicts_and_a_parallel_one_is_kept_longer()
     assert may_resume(one(0, -51, 0, -21), ahead, KEPT).tolist() == [[True]]
 
 
-def test_what_alerts_say_stands_by_target():
-    """Of two targets, heard in turns, and of a track that is of none: a row each instant."""
+@pytest.mark.parametrize("tracks", [None, [5, 9]])
+def test_what_alerts_say_stands_by_contact(tracks):
+    """Two that are heard in turns, targets or tracks that are near none: a row each instant."""
 
     class Alerts(list):
-        row_of_entries, target = np.array([0, 0, 1]), np.array([0, -1, 1])
-        roster = ("a", "b")
+        row_of_entries, target = np.array([0, 1]), np.array([0, 1] if tracks is None else [-1, -1])
+        numbers = {} if tracks is None else {"track": np.array(tracks)}
+        contacts = AlertLevels.contacts
         relative = {
-            "east_m": np.array([1.0, 2.0, 3.0]), "north_m": np.array([4.0, 5.0, 6.0]),
-            "east_mps": np.array([7.0, 8.0, 9.0]), "north_mps": np.array([-1.0, -2.0, -3.0]),
+            "east_m": np.array([1.0, 3.0]), "north_m": np.array([4.0, 6.0]),
+            "east_mps": np.array([7.0, 9.0]), "north_mps": np.array([-1.0, -3.0]),
         }  # fmt: skip
         own_motion = {"east_mps": np.array([10.0, 20.0]), "north_mps": np.array([30.0, 40.0])}
 
-    others, own, heard = _dense(Alerts([None, None]))
-    nan = math.nan
+    alerts, nan = Alerts([None, None]), math.nan
+    others, own, heard = _dense(alerts, alerts.contacts())
     assert heard.tolist() == [[True, False], [False, True]]
     np.testing.assert_array_equal(
         others.position_m, [[[-1.0, nan], [nan, -3.0]], [[-4.0, nan], [nan, -6.0]]]

@@ -23,7 +23,7 @@ from components.radar.detection import (
 from components.radar.link_budget import LinkBudget, calibrated_bandwidth, with_bandwidth
 from components.radar.rcs import fluctuating_rcs
 from components.radar.swerling import SwerlingParameters
-from dsa_des.time.clock import ClockSpec, ScanClock, parse_rational, resolution
+from dsa_des.time.clock import ClockSpec, ScanClock, common_ticks_per_second, parse_rational
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 DEG = math.pi / 180.0
@@ -76,7 +76,7 @@ def worst_gram_charlier(pulses):
 def meetings(first, second, seconds):
     """Scans of two clocks at one instant."""
     specs = [ClockSpec(parse_rational(rate)) for rate in (first, second)]
-    ticks = resolution([time for spec in specs for time in spec.exact_times()])
+    ticks = common_ticks_per_second([time for spec in specs for time in spec.exact_times()])
     scans = [ScanClock(spec, ticks).between(0, seconds * ticks)[1] for spec in specs]
     return np.intersect1d(scans[0], scans[1]).size
 

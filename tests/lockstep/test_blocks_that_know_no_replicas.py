@@ -13,8 +13,8 @@ from dsa_des.arrays.run_ticks import runs_of_single
 from dsa_des.block.component import Component, Input
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.errors import BlockFailure
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.changed_scene import Replica, replica_scene
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
@@ -109,7 +109,7 @@ def test_state_of_an_ordinary_block_stays_with_its_replica(tmp_path, block, kind
         """
     )
     scene = load_scene(path, sets=[*SOUTH, *sets], duration_s="12")
-    scenes = [scene_of(scene, Replica(seed)) for seed in (3, 4, 5)]
+    scenes = [replica_scene(scene, Replica(seed)) for seed in (3, 4, 5)]
     simulation = same_as_alone(scenes, window=window)
     assert list(simulation.timeline.split) == [block]
 
@@ -148,7 +148,7 @@ def with_tracker(tmp_path, kind):
         f'blocks.tracker.type = "{__name__}:{kind.__name__}"\n'
     )
     scene = load_scene(path, sets=SOUTH, duration_s="12")
-    return [scene_of(scene, Replica(seed)) for seed in (3, 4, 5)]
+    return [replica_scene(scene, Replica(seed)) for seed in (3, 4, 5)]
 
 
 @pytest.mark.parametrize("window", [None, 90])
@@ -161,7 +161,7 @@ def test_one_that_serves_all_says_of_which_run_its_rows_are(tmp_path):
     scenes = with_tracker(tmp_path, Unsaid)
     Simulation(scenes[0]).run()
     with pytest.raises(BlockFailure, match=r"tracker.*must say of which run each is"):
-        lock_step(scenes).run()
+        make_lockstep_simulation(scenes).run()
 
 
 def test_a_subclass_says_for_itself_that_it_serves_all_replicas():
@@ -225,4 +225,4 @@ def test_who_does_not_say_of_which_run_it_draws_is_told(tmp_path):
     scenes = with_tracker(tmp_path, DrawsForAll)
     Simulation(scenes[0]).run()
     with pytest.raises(BlockFailure, match=r"tracker.*'forgets'.*several runs.*of_runs"):
-        lock_step(scenes).run()
+        make_lockstep_simulation(scenes).run()

@@ -5,15 +5,15 @@ from same_runs import same_as_alone, tables_of
 from wired import head_on_loop
 
 import dsa_des
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.time.randomness import branch
+from dsa_des.replicas.changed_scene import Replica, replica_scene
+from dsa_des.time.randomness import branch_seed
 
 
 def branches_agree(scene, late_s, later_s):
     """Check a run, a branch of it and a branch of that, and that each goes its own way then."""
-    one = branch(7, late_s * 10**9, 31)
-    seeds = [7, one, branch(one, later_s * 10**9, 32)]
-    scenes = [scene_of(scene, Replica(seed)) for seed in seeds]
+    one = branch_seed(7, late_s * 10**9, 31)
+    seeds = [7, one, branch_seed(one, later_s * 10**9, 32)]
+    scenes = [replica_scene(scene, Replica(seed)) for seed in seeds]
     same_as_alone(scenes)
     _, together = tables_of(scenes)
     for run, until_s in ((1, late_s), (2, later_s)):

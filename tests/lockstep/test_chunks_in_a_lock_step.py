@@ -14,13 +14,13 @@ from lab import CONFIGS
 from dsa_des.errors import SceneError
 from dsa_des.replicas import lock_step_size, replicas
 from dsa_des.replicas.lock_step_size import RunSize, are_few
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.results.folder import failure_counts_of_part
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies import attempts
 from dsa_des.studies.attempts import run_together
-from dsa_des.studies.chunk import Done, run_chunk, run_chunks
+from dsa_des.studies.chunk import ChunkResult, run_chunk, run_chunks
 from dsa_des.studies.study import Chunk, Study
 from dsa_des.studies.study_file import study_of_tables
 
@@ -37,7 +37,7 @@ def study(per_chunk: int, runs: int = RUNS, **more: Any) -> Study:
     return study_of_tables(tables, scene, (), [("duration_s", 4), ("blocks.radar.range_km", 16)])
 
 
-def run_all(one: Study, chunks: Sequence[Chunk]) -> list[Done]:
+def run_all(one: Study, chunks: Sequence[Chunk]) -> list[ChunkResult]:
     return [done for some in run_together(one, chunks, 1) for done in run_chunks(one, some)]
 
 
@@ -48,9 +48,9 @@ def shared(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def noted(scenes: Sequence[Any], **how: Any) -> Any:
         sizes.append(len(scenes))
-        return lock_step(scenes, **how)
+        return make_lockstep_simulation(scenes, **how)
 
-    monkeypatch.setattr(replicas, "lock_step", noted)
+    monkeypatch.setattr(replicas, "make_lockstep_simulation", noted)
     return sizes
 
 
@@ -99,7 +99,9 @@ def test_a_run_holds_about_what_it_is_taken_for() -> None:
             some = [one.replica(k) for k in range(count)]
             before = tracemalloc.get_traced_memory()[0]
             tracemalloc.reset_peak()
-            with_flights: Any = replicas.lock_step(replicas.scenes_of(scene, some))
+            with_flights: Any = replicas.make_lockstep_simulation(
+                replicas.replica_scenes(scene, some)
+            )
             tracemalloc.reset_peak()
             with_flights.run()
             peaks.append(tracemalloc.get_traced_memory()[1] - before)
@@ -149,7 +151,7 @@ def test_cells_without_a_loop_and_single_chunks_are_run_as_they_are(
     chunks = list(two.chunks(0, [0, 1]))
     assert [len(some) for some in run_together(two, chunks, 1)] == [2, 2]  # a cell each
     for broken in (lambda scene: set(), _refused):
-        monkeypatch.setattr(attempts, "opened_loops", broken)
+        monkeypatch.setattr(attempts, "edges_opening_loops", broken)
         assert [len(some) for some in run_together(two, chunks, 1)] == [1] * 4
     assert list(run_together(two, chunks[:1], 8)) == [(chunks[0],)]
     assert list(run_together(two, [], 8)) == []

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from same_runs import same_as_alone, tables_of
 
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import NotInLockStep, lock_step
+from dsa_des.replicas.changed_scene import Replica, replica_scene
+from dsa_des.replicas.lockstep import NotInLockStep, make_lockstep_simulation
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
@@ -28,7 +28,7 @@ def variants(scene, changes=OFFSETS, seed=40):
         {key: Fraction(int(value * 10**9), 10**9) for key, value in change.items()}
         for change in changes
     ]
-    return [scene_of(scene, Replica(seed + i, change)) for i, change in enumerate(fine)]
+    return [replica_scene(scene, Replica(seed + i, change)) for i, change in enumerate(fine)]
 
 
 @pytest.mark.parametrize("window", [None, 50])
@@ -94,13 +94,13 @@ def test_shared_processors_are_refused_by_name():
     sets = ["processors.gpu.service_s=0.01", "blocks.eo.processor=gpu"]
     scene = load_scene(FIRST_LIGHT, sets=sets)
     with pytest.raises(NotInLockStep, match="shared processors"):
-        lock_step([scene, scene])
+        make_lockstep_simulation([scene, scene])
 
 
 def test_aircraft_that_differ_are_refused_not_mixed():
     scene = load_scene(FIRST_LIGHT, duration_s="20")
     changes = [{}, {"blocks.traffic.intruders[0].contrast_ir": 0.5}]
-    scenes = [scene_of(scene, Replica(1, change)) for change in changes]
+    scenes = [replica_scene(scene, Replica(1, change)) for change in changes]
     with pytest.raises(NotInLockStep, match="differs between replicas"):
         tables_of(scenes)
     # They run all the same, one by one.
@@ -114,7 +114,7 @@ def test_targets_whose_radar_cross_sections_differ_run_together():
     sets = ["blocks.radar.swerling=1", "blocks.radar.losses_db=12"]
     scene = load_scene(FIRST_LIGHT, duration_s="60", sets=sets)
     changes = [{"blocks.traffic.intruders[0].rcs_dbsm": rcs} for rcs in (-12.0, 3.0, 20.0)]
-    scenes = [scene_of(scene, Replica(1, change)) for change in changes]
+    scenes = [replica_scene(scene, Replica(1, change)) for change in changes]
     same_as_alone(scenes)
     # Only the cross-section differs: with all draws the same, a larger one is seen more often.
     seen = [sum(tables_of(one)[1]["scans"]["detected"].to_pylist()) for one in scenes]
@@ -126,7 +126,7 @@ def test_a_message_that_comes_after_the_end_comes_in_no_replica():
     for delay_s in (2, 3, 4.3, 5, 9, 20):
         scene = load_scene(FIRST_LIGHT, duration_s="2", sets=[f"blocks.radar.latency_s={delay_s}"])
         replicas = [Replica(seed) for seed in range(4)]
-        same_as_alone([scene_of(scene, replica) for replica in replicas])
+        same_as_alone([replica_scene(scene, replica) for replica in replicas])
 
 
 def test_a_block_that_never_runs_has_its_say():
@@ -139,7 +139,7 @@ def test_a_block_that_never_runs_has_its_say():
     for first in (True, False):
         changes = [{"blocks.radar.enabled": first}, {"blocks.radar.enabled": not first}]
         replicas = [Replica(1, change) for change in changes]
-        scenes = [scene_of(scene, replica) for replica in replicas]
+        scenes = [replica_scene(scene, replica) for replica in replicas]
         with pytest.raises(NotInLockStep, match="block radar asks for something else"):
             tables_of(scenes)
         # They run all the same, one by one; and what they count differs.
@@ -158,7 +158,7 @@ def test_replicas_that_record_other_columns_run_as_they_do_alone(first):
     scene = load_scene(FIRST_LIGHT, duration_s="2", sets=["blocks.radar.enabled=false"])
     replicas = [Replica(1, {"blocks.radar.beam_sweep": sweeps}) for sweeps in (first, not first)]
     with pytest.raises(NotInLockStep, match="block radar records something else"):
-        tables_of([scene_of(scene, replica) for replica in replicas])
+        tables_of([replica_scene(scene, replica) for replica in replicas])
     swept = []
     for replica, together in zip(replicas, run_replicas(scene, replicas), strict=True):
         (alone,) = run_replicas(scene, [replica])
@@ -171,11 +171,15 @@ def test_replicas_that_record_other_columns_run_as_they_do_alone(first):
 def test_a_block_that_never_runs_reports():
     scene = load_scene(FIRST_LIGHT, duration_s="5")
     for key in ("radar", "eo", "ir"):
-        scene = scene_of(scene, Replica(1, {f"blocks.{key}.offset_s": 100}))
+        scene = replica_scene(scene, Replica(1, {f"blocks.{key}.offset_s": 100}))
     change = {"blocks.traffic.ownship.heading_deg": 3.0}
-    scenes = [scene_of(scene, Replica(seed, change if seed == 3 else {})) for seed in (1, 2, 3)]
+    scenes = [
+        replica_scene(scene, Replica(seed, change if seed == 3 else {})) for seed in (1, 2, 3)
+    ]
     found = {}
-    lock_step(scenes, report=lambda number, report: found.update({number: report})).run()
+    make_lockstep_simulation(
+        scenes, report=lambda number, report: found.update({number: report})
+    ).run()
     for number, one in enumerate(scenes):
         alone = Simulation(one).run().report
         assert found[number]["targets"] == alone["targets"]
@@ -205,7 +209,7 @@ def test_replicas_whose_line_of_sight_rests_on_where_their_own_traffic_is(tmp_pa
     outcomes = run_replicas(scene, replicas)
     models, rows = set(), 0
     for replica, outcome in zip(replicas, outcomes, strict=True):
-        simulation, alone = tables_of(scene_of(scene, replica))
+        simulation, alone = tables_of(replica_scene(scene, replica))
         models.add(simulation.components["transform"].rung.earth)
         wanted = alone["detections"]["true_azimuth_rad"].to_pylist()
         assert outcome.tables["detections"]["true_azimuth_rad"].tolist() == wanted

@@ -17,8 +17,8 @@ from components.sensor.declaration import DeclaredPlaces
 from components.tracking.stub import TrackerStub
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.files.toml_files import to_toml
-from dsa_des.replicas.lockstep import lock_step
-from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.replicas.lockstep import make_lockstep_simulation
+from dsa_des.replicas.replicas import Replica, replica_scene
 from dsa_des.scene.scene import load_scene
 
 SETS = [
@@ -122,8 +122,8 @@ def test_each_of_split_blocks_reports_of_its_own_length(tmp_path):
     near = ["blocks.traffic.intruders[0].north_m=1300"]
     base, told = load_scene(tmp_path / "scene.toml", sets=near), {}
     rules = [{"blocks.over.after_s": Fraction(after_s)} for after_s in (2, 5, 300)]
-    simulation = lock_step(
-        [scene_of(base, Replica(4 + k, rule)) for k, rule in enumerate(rules)],
+    simulation = make_lockstep_simulation(
+        [replica_scene(base, Replica(4 + k, rule)) for k, rule in enumerate(rules)],
         report=lambda number, said: told.update({(number, *said): said}) if said else None,
     )
     simulation.run()

@@ -8,8 +8,8 @@ from same_runs import replicas_of, same_as_alone, tables_of
 
 from components.encounters.ending import ClosestApproachPassed
 from dsa_des.errors import SceneError
-from dsa_des.replicas.lockstep import lock_step
-from dsa_des.replicas.replicas import Replica, run_replicas, scene_of
+from dsa_des.replicas.lockstep import make_lockstep_simulation
+from dsa_des.replicas.replicas import Replica, replica_scene, run_replicas
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
@@ -78,7 +78,7 @@ def test_a_replica_s_record_says_how_long_it_was(tmp_path):
     replicas = [Replica(k, {SPEED: speed}) for k, speed in enumerate((40.0, 90.0))]
     together = run_replicas(scene, replicas)
     for replica, found in zip(replicas, together, strict=True):
-        alone = Simulation(scene_of(scene, replica))
+        alone = Simulation(replica_scene(scene, replica))
         assert found.duration_s == alone.run().duration_s == float(alone.duration_s) < 45
         assert found.ended_early
         assert max(found.tables["scans"]["time_s"]) < found.duration_s
@@ -88,8 +88,8 @@ def test_a_replica_s_record_says_how_long_it_was(tmp_path):
 def test_what_has_ended_runs_no_more(tmp_path):
     """Rows of replicas that have ended come to no block, and a batch ends with its last."""
     scene = loaded(tmp_path, CROSSING)
-    scenes = [scene_of(scene, Replica(k, {SPEED: v})) for k, v in enumerate((40.0, 90.0))]
-    simulation = lock_step(scenes)
+    scenes = [replica_scene(scene, Replica(k, {SPEED: v})) for k, v in enumerate((40.0, 90.0))]
+    simulation = make_lockstep_simulation(scenes)
     seen = []
     node = simulation.nodes["tracker"]
     runner = node.runner
@@ -133,7 +133,7 @@ def test_what_is_under_way_at_the_end_does_not_come(tmp_path):
     scene = loaded(tmp_path, text)
     scenes = replicas_of(scene, {SPEED: 40.0}, {SPEED: 90.0})
     simulation = same_as_alone(scenes)
-    together = lock_step(scenes)
+    together = make_lockstep_simulation(scenes)
     fusion = together.nodes["fusion"]
     came, runner = [], fusion.runner
 

@@ -11,10 +11,10 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.component import Component
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import NotInLockStep, lock_step
+from dsa_des.replicas.changed_scene import Replica, replica_scene
+from dsa_des.replicas.lockstep import NotInLockStep, make_lockstep_simulation
 from dsa_des.replicas.replicas import Recorded, lock_step_refusal, run_replicas
-from dsa_des.replicas.split_block import SplitBlock, _part
+from dsa_des.replicas.split_block import SplitBlock, _rows_of_replica
 from dsa_des.scene.scene import load_scene
 
 FIRST_LIGHT = "configs/first_light.toml"
@@ -33,7 +33,7 @@ def test_a_split_block_is_no_block():
     """It has nothing that the engine could ask in the place of the block itself."""
     assert not issubclass(SplitBlock, Component)
     scenes = replicas_of(near(), {COINCIDENCE: 0}, {COINCIDENCE: Fraction(1, 5)})
-    simulation = lock_step(scenes)
+    simulation = make_lockstep_simulation(scenes)
     for name, node in simulation.nodes.items():
         assert type(node.component) is scenes[0].blocks[name].cls
         assert node.component is simulation.components[name]
@@ -61,11 +61,11 @@ def test_a_clock_in_some_replicas_only_is_run_one_by_one():
     scene, rate = near(), {"blocks.traffic.update_rate_hz": 2}
     for changes in ([{}, rate], [rate, {}]):
         with pytest.raises(NotInLockStep, match="in some replicas only"):
-            lock_step(replicas_of(scene, *changes))
+            make_lockstep_simulation(replicas_of(scene, *changes))
     replicas = [Replica(20), Replica(21, rate)]
     outcomes = run_replicas(scene, replicas)
     assert all(isinstance(outcome, Recorded) for outcome in outcomes)
-    _, alone = tables_of(scene_of(scene, replicas[1]))
+    _, alone = tables_of(replica_scene(scene, replicas[1]))
     got, wanted = outcomes[1].tables["detections"]["tick"], alone["detections"]["tick"]
     assert got.tolist() == wanted.to_pylist()
     assert "in some replicas only" in lock_step_refusal(scene, replicas)
@@ -82,7 +82,7 @@ def test_a_delay_in_scans_follows_the_replicas_own_clock():
     scene = near(DELAYED)
     rates = [{"blocks.radar.scan_rate_hz": rate} for rate in (4, 5)]
     with pytest.raises(NotInLockStep, match="scans that differ"):
-        lock_step(replicas_of(scene, *rates))
+        make_lockstep_simulation(replicas_of(scene, *rates))
     offsets = [{"blocks.radar.offset_s": Fraction(n, 100)} for n in (0, 5, 13)]
     same_as_alone(replicas_of(scene, *offsets))
 
@@ -133,13 +133,13 @@ def test_a_replica_that_was_sent_nothing_yet_holds_nothing():
     message = Message(np.array([2, 4], dtype=np.int64), run=np.array([0, 1]))
     held = {"cue": (message, np.array([0, 0, -1, 1]))}
     wake = Wake(RunTicks(run, ticks), np.full(4, -1), 1, held, {})
-    of_first, rows = _part(wake, slice(0, 2), 0).held("cue")
+    of_first, rows = _rows_of_replica(wake, slice(0, 2), 0).held("cue")
     assert of_first.tick.tolist() == [2] and rows.tolist() == [0, 0]
-    of_second, rows = _part(wake, slice(2, 4), 1).held("cue")
+    of_second, rows = _rows_of_replica(wake, slice(2, 4), 1).held("cue")
     assert of_second.tick.tolist() == [4] and rows.tolist() == [-1, 0]
     last = RunTicks(run[2:3], ticks[2:3])
     nothing = Wake(last, np.full(1, -1), 1, {"cue": (message, np.array([-1]))}, {})
-    assert _part(nothing, slice(0, 1), 1).held("cue") is None
+    assert _rows_of_replica(nothing, slice(0, 1), 1).held("cue") is None
 
 
 def test_what_comes_between_scans_waits_for_the_instance(monkeypatch):
@@ -167,9 +167,9 @@ def test_beams_that_ask_through_several_lines_of_sight_run_one_by_one():
     sets = ["blocks.radar.beam_sweep=true", "blocks.traffic.ownship.roll_deg=15"]
     scene = near(*sets, duration_s="6")
     replicas = [Replica(3, {"blocks.transform.attitude": a}) for a in ("exact", "small_angle")]
-    scenes = [scene_of(scene, one) for one in replicas]
+    scenes = [replica_scene(scene, one) for one in replicas]
     with pytest.raises(NotInLockStep, match="one line of sight"):
-        lock_step(scenes).run()
+        make_lockstep_simulation(scenes).run()
     for one, ran in zip(scenes, run_replicas(scene, replicas), strict=True):
         alone = tables_of(one)[1]["detections"]["azimuth_rad"].to_pylist()
         assert len(alone) > 3 and ran.tables["detections"]["azimuth_rad"].tolist() == alone
@@ -191,4 +191,4 @@ def test_recorded_flights_are_flown_together_where_they_last_as_long(tmp_path):
     assert list(simulation.timeline.together) == ["traffic"]
     changes[1] = {"blocks.traffic.file": tmp_path / "longer.daa"}
     with pytest.raises(NotInLockStep, match="another duration"):
-        lock_step(replicas_of(scene, *changes)).run()
+        make_lockstep_simulation(replicas_of(scene, *changes)).run()

@@ -12,7 +12,7 @@ from components.metrics.fused_share import coincidence_share
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import run_replicas
 from dsa_des.scene.scene import Scene, load_scene
-from dsa_des.studies.metric import Group, columns_wanted
+from dsa_des.studies.metric import Group, needed_columns
 from dsa_des.studies.study import MetricSpec
 
 PAIRS = [
@@ -60,8 +60,8 @@ def test_simulation_and_rational_counts_agree(pair: tuple[str, ...], small: Path
     duration = (2 * beat if whole else Fraction(6)) + max(o1, o2) + 1 / min(f1, f2)
     scene = scene_of_pair(pair, duration)
     metric = MetricSpec("fused_share").build(scene)
-    recorded = run_replicas(scene, [Replica(1)], wanted=columns_wanted([metric]))
-    group = Group(scene, [Replica(1)], recorded, columns_wanted([metric]))  # type: ignore[arg-type]
+    recorded = run_replicas(scene, [Replica(1)], wanted=needed_columns([metric]))
+    group = Group(scene, [Replica(1)], recorded, needed_columns([metric]))  # type: ignore[arg-type]
     found = metric.measure(group)
     expected = metric.analytic_answers(scene)
     ours, theirs = (_scans(f, o, duration) for f, o in ((f1, o1), (f2, o2)))
@@ -150,8 +150,8 @@ def with_late_radar(scene_file: str, delay_s: str) -> Scene:
 
 def shares_of(scene: Scene) -> dict[str, float]:
     metric = MetricSpec("fused_share").build(scene)
-    recorded = run_replicas(scene, [Replica(1)], wanted=columns_wanted([metric]))
-    group = Group(scene, [Replica(1)], recorded, columns_wanted([metric]))  # type: ignore[arg-type]
+    recorded = run_replicas(scene, [Replica(1)], wanted=needed_columns([metric]))
+    group = Group(scene, [Replica(1)], recorded, needed_columns([metric]))  # type: ignore[arg-type]
     return {name: float(values[0]) for name, values in metric.measure(group).items()}
 
 

@@ -23,7 +23,7 @@ from dsa_des.block.message import Text
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.replicas import run_replicas
 from dsa_des.scene.scene import load_scene
-from dsa_des.studies.metric import METRICS, Group, columns_wanted
+from dsa_des.studies.metric import METRICS, Group, needed_columns
 from dsa_des.studies.study import MetricSpec
 
 WELL_CLEAR_M, NMAC_M = (
@@ -165,7 +165,7 @@ def test_what_is_measured_of_recorded_rows_is_as_by_hand(
         for k, tables in enumerate(RUNS)
     ]
     replicas = [Replica(k) for k in range(len(runs))]
-    found = metric.measure(Group(scene, replicas, runs, columns_wanted([metric])))
+    found = metric.measure(Group(scene, replicas, runs, needed_columns([metric])))
     assert found.keys() == wanted.keys()
     for key, values in wanted.items():
         if found[key].dtype == object:
@@ -290,7 +290,7 @@ KEYS = {"track_errors_by_range": {"from_s": 1.0, "ranges_nmi": [2.4, 2.6]}}
 def test_a_group_measures_what_its_runs_measure_alone(small: Path, name: str) -> None:
     scene = load_scene(OF_OTHERS[name](small) if name in OF_OTHERS else "small.toml")
     metric = MetricSpec(name, KEYS.get(name, {})).build(scene)
-    wanted = columns_wanted([metric])
+    wanted = needed_columns([metric])
     replicas = [
         Replica(k, {"blocks.traffic.intruders[0].east_m": 60.0 * k, "blocks.ir.offset_s": k / 16})
         for k in range(5)
@@ -327,8 +327,8 @@ def test_an_old_detection_that_comes_late_makes_nothing_older(small: Path) -> No
     Path("late.toml").write_text(text)
     scene = load_scene("late.toml")
     metric = MetricSpec("age_of_information").build(scene)
-    recorded = run_replicas(scene, [Replica(1)], wanted=columns_wanted([metric]))
-    found = metric.measure(Group(scene, [Replica(1)], recorded, columns_wanted([metric])))
+    recorded = run_replicas(scene, [Replica(1)], wanted=needed_columns([metric]))
+    found = metric.measure(Group(scene, [Replica(1)], recorded, needed_columns([metric])))
     assert found["age_of_information_mean_s"] == pytest.approx([0.25])
     assert found["age_of_information_p95_s"] == pytest.approx([0.475])
 

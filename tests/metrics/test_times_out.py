@@ -10,8 +10,8 @@ from wired import chain
 
 import dsa_des
 from dsa_des.arrays.run_ticks import RunTicks
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.times_out import times_out_s
+from dsa_des.replicas.changed_scene import Replica, replica_scene
+from dsa_des.replicas.times_out import outage_times_of_seeds
 from dsa_des.running.simulation import Simulation
 from dsa_des.stretches.outage import Outage
 
@@ -90,7 +90,7 @@ def test_the_share_out_is_that_of_a_renewal_process(conf, between_s, repair_s, l
     """Up at 0 s, it is out at t with a chance of (1 - exp(-(λ + μ) t)) λ / (λ + μ)."""
     failing = {"blocks": ["radar"], "mean_between_s": between_s, "mean_repair_s": repair_s}
     scene = dsa_des.load_scene(watched(conf, outages=[failing]))
-    spans = times_out_s(scene, range(1500), np.full(1500, float(lasts_s)))["radar"]
+    spans = outage_times_of_seeds(scene, range(1500), np.full(1500, float(lasts_s)))["radar"]
     shares = np.array([(s[:, 1] - s[:, 0]).sum() for s in spans]) / lasts_s
     fails, mends = 1 / between_s, 1 / repair_s
     rate = fails + mends
@@ -108,10 +108,10 @@ def test_each_run_is_out_when_its_simulation_is_whatever_runs_beside_it(conf):
     scene = dsa_des.load_scene(watched(conf, outages=failing, changes=[off("radar", 3, 9)]))
     assert scene.outages == [Outage(**one) for one in failing]
     seeds = [5, 6, 7]
-    together = times_out_s(scene, seeds, np.full(3, 40.0))["radar"]
+    together = outage_times_of_seeds(scene, seeds, np.full(3, 40.0))["radar"]
     for seed, spans in zip(seeds, together, strict=True):
-        one = scene_of(scene, Replica(seed))
-        (alone,) = times_out_s(one, [seed], np.array([40.0]))["radar"]
+        one = replica_scene(scene, Replica(seed))
+        (alone,) = outage_times_of_seeds(one, [seed], np.array([40.0]))["radar"]
         assert np.array_equal(alone, spans)
         simulation = Simulation(one)
         simulation.run()

@@ -15,8 +15,8 @@ from components.operator.human import MOST_WAITING, Desk, PendingDecision
 from components.operator.recorded import read_decisions
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import lock_step
-from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.replicas.lockstep import make_lockstep_simulation
+from dsa_des.replicas.replicas import Replica, replica_scene
 from dsa_des.running.simulation import Simulation
 
 HUMAN, RECORDED = "operator.human", "operator.recorded"
@@ -315,7 +315,7 @@ def test_a_turn_and_a_climb_are_flown_together(tmp_path, table, turned_rad, clim
         sink = MemorySink()
         recorder = Recorder([sink])
         if len(scenes) > 1:
-            lock_step(list(scenes), recorder=recorder).run()
+            make_lockstep_simulation(list(scenes), recorder=recorder).run()
         else:
             Simulation(scenes[0], recorder=recorder, **keywords).run()
         return sink.tables()
@@ -334,7 +334,9 @@ def test_a_turn_and_a_climb_are_flown_together(tmp_path, table, turned_rad, clim
         begun_m += 4.0 * (second_s - first_s)
     assert own[-1]["alt_m"] - begun_m == pytest.approx(climbed_m, abs=0.1)
     assert all(alone[name].equals(found) for name, found in tables(loaded, window=1).items())
-    both = tables(*(scene_of(loaded, Replica(seed, {})) for seed in (3, 4)))["truth"].to_pylist()
+    both = tables(*(replica_scene(loaded, Replica(seed, {})) for seed in (3, 4)))[
+        "truth"
+    ].to_pylist()
     for replica in (0, 1):
         theirs = [row for row in both if row["replica"] == replica and row["target"] is None]
         for name in ("lat_deg", "lon_deg", "alt_m", "heading_rad"):

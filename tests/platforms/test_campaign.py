@@ -1,5 +1,6 @@
 """The published campaign: counts of several folders, and whose interval holds whose."""
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -31,17 +32,24 @@ def test_runs_of_a_cell_count_together_and_are_held_against_the_published_ones()
     assert ring.endswith("| no |") and "5.00e-1" in ring
 
 
-def test_pairs_of_the_shipped_study_meet_where_both_fly_on_and_all_cells_of_both_run(tmp_path):
+def test_pairs_of_the_shipped_study_meet_where_both_fly_on_and_all_cells_of_all_run(tmp_path):
     within = "metrics=[{metric='mitigated', horizontal_m=%s, vertical_m=50, nmac_horizontal_m=0.5}]"
     for study, keys in {
         "velocity_pairs": ("set.duration_s=78", within % 1),
         "velocity_rings": ("set.duration_s=2",),
+        "fleet_size": ("set.duration_s=2",),
     }.items():
         sets = [word for key in ("replicas=1", *keys) for word in ("--set", key)]
         end = ("--workers", "1", "--quiet", "--no-figures", "--out", str(tmp_path / study))
         done = CliRunner().invoke(main, ["study", study, *sets, *end])
         assert done.exit_code == 0, done.output
         runs = pd.read_parquet(tmp_path / study / "parts")
+        if study == "fleet_size":
+            # Who is on the circle has neighbours a chord away, two seconds nearer to the middle.
+            chord = 2.0 * np.sin(np.pi / runs["aircraft"])
+            assert runs["least_separation_m"].between(1400 * chord, 1500.01 * chord).all()
+            assert sorted(runs["aircraft"]) == [2, 4, 8, 16]
+            continue
         assert len(counted([runs])) == 12
         if study == "velocity_pairs":
             assert (runs["well_clear_lost_nominal"] == 1.0).all()

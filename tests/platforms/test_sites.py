@@ -9,7 +9,7 @@ from same_runs import same_as_alone, same_in_any_window, tables_of
 
 import dsa_des
 from dsa_des import SceneError
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.running.simulation import Simulation
 
 OWN = {"lat_deg": 52.0, "lon_deg": 4.4, "alt_m": 1000, "heading_deg": 30, "speed_mps": 50}
@@ -123,7 +123,9 @@ def test_the_same_bytes_in_any_window_and_beside_other_runs(radar):
     scene = watched(SITE, radar=radar)
     same_in_any_window(scene)
     changes = ({}, {"blocks.traffic.intruders[0].east_m": 2500.0})
-    same_as_alone([scene_of(scene, Replica(5 + k, change)) for k, change in enumerate(changes)])
+    same_as_alone(
+        [replica_scene(scene, Replica(5 + k, change)) for k, change in enumerate(changes)]
+    )
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from covering import covers
 from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 
 import dsa_des
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.running.nodes import find_demands
 from dsa_des.running.simulation import Simulation
 
@@ -17,7 +17,7 @@ SCENE = "configs/platforms/velocities.toml"
 
 
 def scene(**keys):
-    return scene_of(dsa_des.load_scene(SCENE), Replica(1, {"duration_s": 30, **keys}))
+    return replica_scene(dsa_des.load_scene(SCENE), Replica(1, {"duration_s": 30, **keys}))
 
 
 def of_block(table, name):
@@ -143,6 +143,68 @@ def test_fixes_are_told_by_the_clock():
 def test_they_are_the_same_in_any_window_and_beside_other_runs():
     same_in_any_window(scene(duration_s=20))
     same_as_alone(replicas_of(scene(duration_s=12), {}, {"blocks.exchange.position_m": 10}))
+    same_in_any_window(ghost(36, 1.5))
+    same_as_alone(replicas_of(ghost(20), {}, {"blocks.ads_b.offset_s": 0.5}))
+
+
+def ghost(duration_s=30, delay_s=0, **equipage):
+    """Return a multirotor whose receiver hears an aircraft come head-on, from 600 m ahead.
+
+    It is 2 km beside where it says to be: the track is near no target.
+    """
+    wires = [
+        "traffic -> transform -> gate -> ads_b -> fusion -> tracker",
+        "traffic -> alerting -> avoidance", "traffic -> avoidance",
+        {"from": "tracker", "to": "alerting", "delay_s": delay_s, "holds": "nothing"},
+        {"from": "avoidance", "to": "traffic", "delay_s": 0.1, "holds": "nothing"},
+    ]  # fmt: skip
+    heard = {"spoofed_east_m": 2000, "nacv": 4, "nacp": 11, **equipage}
+    other = {"name": "other", "east_m": -2000, "north_m": 600, "up_m": 0, "heading_deg": 180,
+             "speed_mps": 10, "ads_b": heard}  # fmt: skip
+    own = {"lat_deg": 52, "lon_deg": 4, "alt_m": 100, "heading_deg": 0, "speed_mps": 10}
+    ads_b = {"type": "surveillance.ads_b", "scan_rate_hz": 1, "position_errors": "none"}
+    types = {"transform": "geometry.ellipsoid", "gate": "gate", "fusion": "fusion.pass_through"}
+    tracker = {"type": "tracking.ekf", "acceleration_intensity_m2_s3": 0.5}
+    blocks = {
+        "traffic": {"type": "traffic.scripted", "ownship": own, "intruders": [other]},
+        **{name: {"type": kind} for name, kind in types.items()},
+        "ads_b": ads_b, "tracker": tracker,
+        "alerting": {"type": "alerting.daidalus", "scan_rate_hz": 1,
+                     "conf": "configs/alerting/do365b.conf"},
+        "avoidance": {"type": "avoidance.mvp", "speed_mps": 10},
+    }  # fmt: skip
+    return dsa_des.load_scene(
+        {"duration_s": duration_s, "seed": 1, "wires": wires, "blocks": blocks}
+    )
+
+
+def test_it_keeps_away_from_what_its_tracker_says_though_nobody_is_there():
+    found = tables_of(ghost(35, delay_s=1.5))[1]
+    assert {(row["target"], row["track"]) for row in found["alerts"].to_pylist()} == {(None, 1)}
+    own = [row for row in found["truth"].to_pylist() if row["target"] is None]
+    apart_m = [
+        math.hypot((row["lon_deg"] - 4) * 68_677.0, (row["lat_deg"] - 52) * 111_267.0
+                   - (600 - 10 * row["time_s"])) for row in own
+    ]  # fmt: skip
+    assert 45.0 < min(apart_m) < 65.0
+    # Past it, the first track again.
+    told = of_block(found["manoeuvres"], "avoidance")
+    assert told[0]["time_s"] == 5.0 and 29.0 < told[-1]["time_s"] < 33.0
+    assert (told[-1]["velocity_east_mps"], told[-1]["velocity_north_mps"]) == (0.0, 10.0)
+
+
+def test_who_is_heard_no_more_is_kept_in_mind_for_half_a_minute():
+    """Its broadcasts end in the conflict, then its track: the way out is flown on for 30 s."""
+    found = tables_of(ghost(60, silent_after_s=6))[1]
+    last_s = max(row["time_s"] for row in found["alerts"].to_pylist())
+    told = of_block(found["manoeuvres"], "avoidance")
+    assert 6.0 < last_s < 25.0
+    assert [row["time_s"] for row in told if row["velocity_east_mps"] == 0.0] == [last_s + 32.0]
+    # Its own velocity, as it knows it, is that over the ground: nothing is lost from look to look.
+    held = [
+        row["velocity_east_mps"] for row in told if last_s + 2.0 < row["time_s"] < last_s + 32.0
+    ]
+    assert held[0] > 1.5 and held == pytest.approx([held[0]] * len(held), rel=1e-4)
 
 
 def test_a_demand_that_comes_back_around_a_loop_asks_nothing_new():
@@ -163,7 +225,7 @@ def test_the_fleet_keeps_apart_without_errors():
     exact = {
         f"blocks.exchange{s}.{key}": 0 for s in names for key in ("position_m", "velocity_mps")
     }
-    simulation = Simulation(scene_of(dsa_des.load_scene(fleet), Replica(1, exact)))
+    simulation = Simulation(replica_scene(dsa_des.load_scene(fleet), Replica(1, exact)))
     simulation.run()
     traffic, times = simulation.nodes["traffic"].component, np.arange(0.0, 200.0, 0.5)
     states = [traffic.own.at(times), *(flight.at(times) for flight in traffic.targets)]

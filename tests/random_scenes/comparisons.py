@@ -17,8 +17,8 @@ from dsa_des.block.message import Text
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
-from dsa_des.replicas.changed_scene import scene_of
-from dsa_des.replicas.lockstep import NotInLockStep, lock_step
+from dsa_des.replicas.changed_scene import replica_scene
+from dsa_des.replicas.lockstep import NotInLockStep, make_lockstep_simulation
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
@@ -192,7 +192,7 @@ def _replicas_differ(case: Case, scene: Scene, dice: Dice) -> str:
     case.features |= dice.features
     window, tables, failure = dice.pick(1, 3, 40), None, ""
     try:
-        tables = _in_lock_step([scene_of(scene, one) for one in replicas], window)
+        tables = _in_lock_step([replica_scene(scene, one) for one in replicas], window)
         case.features.add("replicas in lock step")
     except NotInLockStep:
         case.features.add("replicas one by one")
@@ -234,7 +234,7 @@ def _in_lock_step(scenes: list[Scene], window: int) -> dict[str, dict[str, Any]]
     NotInLockStep, SceneError
     """
     sink = ColumnSink()
-    lock_step(scenes, recorder=Recorder([sink]), window=window).run()
+    make_lockstep_simulation(scenes, recorder=Recorder([sink]), window=window).run()
     return plain(sink.tables())
 
 

@@ -23,8 +23,8 @@ from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
-from dsa_des.replicas.changed_scene import scene_of
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.changed_scene import replica_scene
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.replicas.replicas import Recorded, run_replicas
 from dsa_des.scene.scene import load_scene
 
@@ -37,9 +37,11 @@ def judged(seed: int, folder: Path) -> tuple[str, set[str]]:
     path = folder / f"{seed}.toml"
     path.write_text(to_toml(loop_of(dice, str(_ROOT))), encoding="utf-8")
     scene, replicas = load_scene(path), loop_replicas(dice)
-    scenes = [scene_of(scene, one) for one in replicas]
+    scenes = [replica_scene(scene, one) for one in replicas]
     sink = ColumnSink()
-    together = lock_step(scenes, recorder=Recorder([sink]), window=dice.pick(None, None, 5, 40))
+    together = make_lockstep_simulation(
+        scenes, recorder=Recorder([sink]), window=dice.pick(None, None, 5, 40)
+    )
     together.run()
     assert len(together.runs.going) > 1
     tables = plain(sink.tables())

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 import dsa_des
 from dsa_des.files.output_folder import RUN_JSON, OutputFolder, foreign_files
 from dsa_des.record.drawing import _make_plain
-from dsa_des.record.run_folder import _rows_of, read_run, write_json, write_run_json
+from dsa_des.record.run_folder import _matching_rows, read_run, write_json, write_run_json
 
 
 def fill(folder, rows=3):
@@ -122,8 +122,8 @@ def test_rows_of_another_table_are_found_by_block_tick_and_replica(is_dictionary
     mine = [(r, t, b) for b in "cab" for t in (9, 0, 4, 7) for r in (0, 2, 1)]
     theirs = [(r, t, b) for r in (1, 0) for b in "bdc" for t in (4, 9, 8)]
     wanted = [theirs.index(key) if key in theirs else -1 for key in mine]
-    assert _rows_of(table(mine), table(theirs)).tolist() == wanted
-    assert _rows_of(table(mine), table(theirs).slice(0, 0)).tolist() == [-1] * len(mine)
+    assert _matching_rows(table(mine), table(theirs)).tolist() == wanted
+    assert _matching_rows(table(mine), table(theirs).slice(0, 0)).tolist() == [-1] * len(mine)
 
 
 def test_long_and_hostile_words_are_cut_wherever_they_stand_in_a_figure():

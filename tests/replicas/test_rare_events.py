@@ -16,7 +16,7 @@ from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.splitting import FlownRuns, choose_parents, find_levels, run_repetitions
-from dsa_des.results.statistics import rare
+from dsa_des.results.statistics import estimate_rare_mean
 from dsa_des.studies.chunk import run_chunk
 from dsa_des.studies.study_file import read_study
 from dsa_des.time.randomness import Streams
@@ -72,7 +72,7 @@ def test_a_rare_probability_is_found_without_bias():
 
 
 def test_intervals_cover():
-    found = [rare(some, np.zeros(10), 0.95) for some in of_many(2000).reshape(-1, 10)]
+    found = [estimate_rare_mean(some, np.zeros(10), 0.95) for some in of_many(2000).reshape(-1, 10)]
     covered = [one.low <= RARE <= one.high for one in found]
     # Three standard errors of a binomial share of so many intervals.
     assert abs(np.mean(covered) - 0.95) <= 3.0 * math.sqrt(0.95 * 0.05 / len(found))
@@ -129,15 +129,15 @@ def test_a_collapsed_repetition_is_none_that_is_dropped():
 
 def test_the_interval_where_no_repetition_came_to_it():
     """3.69 events are seen at least once with 97.5 %: so many times what one would have added."""
-    nothing = rare(np.zeros(10), np.full(10, 2e-6), 0.95)
+    nothing = estimate_rare_mean(np.zeros(10), np.full(10, 2e-6), 0.95)
     assert (nothing.value, nothing.low) == (0.0, 0.0)
     assert nothing.high == pytest.approx(-math.log(0.025) * 2e-6 / 10)
-    assert rare(np.zeros(10), np.full(10, 5.0), 0.95).high == 1.0
+    assert estimate_rare_mean(np.zeros(10), np.full(10, 5.0), 0.95).high == 1.0
 
 
 def test_the_interval_of_a_skewed_mean_is_that_of_its_logarithm():
     values = np.array([1e-6, 2e-6, 4e-6])
-    found = rare(values, np.zeros(3), 0.95)
+    found = estimate_rare_mean(values, np.zeros(3), 0.95)
     half = 4.302652729911275 * values.std(ddof=1) / math.sqrt(3) / values.mean()
     np.testing.assert_allclose([found.low, found.high], values.mean() * np.exp([-half, half]))
 
@@ -222,7 +222,9 @@ def test_a_probability_of_half_a_millionth_in_a_closed_loop(tmp_path):
     levels = [*range(26, 7, -2)]
     table = {"event": "nmac", "runs": 40, "levels": levels}
     rows = rows_of(study_of(tmp_path, splitting=table, replicas=12))
-    found = rare(*(np.array([row[n] for row in rows]) for n in ("nmac", "nmac.unseen")), 0.95)
+    found = estimate_rare_mean(
+        *(np.array([row[n] for row in rows]) for n in ("nmac", "nmac.unseen")), 0.95
+    )
     assert found.low < 0.5**21 < found.high
     assert found.high < 5.0 * found.low
 
@@ -231,7 +233,9 @@ def test_distances_part_runs_that_may_still_turn(tmp_path):
     """Where a third of the runs come near without a turn they find what the closed form says."""
     table = {"event": "nmac", "score": "separation", "runs": 60, "levels": [10]}
     rows = rows_of(study_of(tmp_path, 0.93, splitting=table, replicas=8))
-    found = rare(*(np.array([row[n] for row in rows]) for n in ("nmac", "nmac.unseen")), 0.95)
+    found = estimate_rare_mean(
+        *(np.array([row[n] for row in rows]) for n in ("nmac", "nmac.unseen")), 0.95
+    )
     assert found.low < 0.93**21 < found.high < 2.0 * found.low
 
 
@@ -292,6 +296,6 @@ def test_what_makes_splitting_impossible_is_said_before_the_first_run(keys, said
 
 
 def test_a_block_that_cannot_be_flown_again_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("components.avoidance.TurnAway.needs_host", "is a host's")
+    monkeypatch.setattr("components.turning_away.TurnAway.needs_host", "is a host's")
     with pytest.raises(SceneError, match="splitting: the block avoidance waits for a host program"):
         study_of(tmp_path)

@@ -7,9 +7,9 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from dsa_des.results.differences import difference, paired_units
+from dsa_des.results.differences import estimate_difference, paired_units
 from dsa_des.results.record import EVENT, NUMBER, SHARE, TRIALS, Result
-from dsa_des.results.statistics import Estimate, mean, share
+from dsa_des.results.statistics import Estimate, estimate_mean, estimate_share
 from dsa_des.results.summary import compare_axis, summarise
 from dsa_des.studies.draws import parse_draw
 from tests.results.conftest import rows_of_table
@@ -42,13 +42,15 @@ def test_means(method: str, count: int, shape: str) -> None:
         "uniform": lambda r: r.uniform(2.0, 4.0, count),
         "skewed": lambda r: r.gamma(16.0, 3 / 16, count),  # skewness 1/2
     }[shape]
-    found = coverage(lambda r: mean(draw(r), LEVEL, method), 3.0, 1000)
+    found = coverage(lambda r: estimate_mean(draw(r), LEVEL, method), 3.0, 1000)
     assert 0.93 <= found <= 0.975
 
 
 def test_the_bootstrap_covers_long_tails_better_than_t() -> None:
-    t = coverage(lambda r: mean(r.exponential(1.0, 20), LEVEL, "t"), 1.0, 1000)
-    bootstrap = coverage(lambda r: mean(r.exponential(1.0, 20), LEVEL, "bootstrap"), 1.0, 1000)
+    t = coverage(lambda r: estimate_mean(r.exponential(1.0, 20), LEVEL, "t"), 1.0, 1000)
+    bootstrap = coverage(
+        lambda r: estimate_mean(r.exponential(1.0, 20), LEVEL, "bootstrap"), 1.0, 1000
+    )
     assert t < bootstrap and 0.93 <= bootstrap <= 0.97
 
 
@@ -60,7 +62,7 @@ def test_shares_of_single_trials(count: int) -> None:
     for _ in range(ROUNDS):
         chance = random.uniform(0.03, 0.97)
         won = random.binomial(1, chance, count).astype(float)
-        e = share(won, np.ones(count), LEVEL)
+        e = estimate_share(won, np.ones(count), LEVEL)
         held += e.low <= chance <= e.high
     assert 0.93 <= held / ROUNDS <= 0.97
 
@@ -73,7 +75,9 @@ def test_shares_of_trials_that_hang_together(
 ) -> None:
     each = np.full(units, float(trials))
     found = coverage(
-        lambda r: share(r.binomial(trials, r.beta(*shape, units)).astype(float), each, LEVEL),
+        lambda r: estimate_share(
+            r.binomial(trials, r.beta(*shape, units)).astype(float), each, LEVEL
+        ),
         shape[0] / sum(shape),
     )
     assert 0.93 <= found <= 0.98
@@ -81,7 +85,9 @@ def test_shares_of_trials_that_hang_together(
 
 def test_shares_of_trials_that_do_not_hang_together_are_a_little_wide() -> None:
     each = np.full(15, 40.0)
-    found = coverage(lambda r: share(r.binomial(40, 0.3, 15).astype(float), each, LEVEL), 0.3)
+    found = coverage(
+        lambda r: estimate_share(r.binomial(40, 0.3, 15).astype(float), each, LEVEL), 0.3
+    )
     assert 0.95 <= found <= 0.985
 
 
@@ -90,11 +96,13 @@ def test_units_that_go_one_way_as_a_whole_count_once() -> None:
     random, held = np.random.default_rng(3), 0
     for _ in range(ROUNDS):
         won = 50.0 * random.binomial(1, 0.95, 20)
-        e = share(won, np.full(20, 50.0), LEVEL)
+        e = estimate_share(won, np.full(20, 50.0), LEVEL)
         held += e.low <= 0.95 <= e.high
     assert 0.93 <= held / ROUNDS <= 0.99
-    assert math.isnan(share(np.array([30.0]), np.array([50.0]), LEVEL).low)
-    assert share(np.array([1.0]), np.array([1.0]), LEVEL).low == pytest.approx(0.2065, abs=1e-4)
+    assert math.isnan(estimate_share(np.array([30.0]), np.array([50.0]), LEVEL).low)
+    assert estimate_share(np.array([1.0]), np.array([1.0]), LEVEL).low == pytest.approx(
+        0.2065, abs=1e-4
+    )
 
 
 @pytest.mark.parametrize(("method", "count"), [("t", 10), ("t", 40), ("bootstrap", 10)])
@@ -103,14 +111,15 @@ def test_paired_differences(method: str, count: int) -> None:
         first = random.normal(0.0, 5.0, count)
         return first, first + random.gamma(36.0, 1 / 12, count)
 
-    found = coverage(lambda r: difference(*pairs(r), LEVEL, method).paired, 3.0, 1000)
+    found = coverage(lambda r: estimate_difference(*pairs(r), LEVEL, method).paired, 3.0, 1000)
     assert 0.93 <= found <= 0.97
 
 
 @pytest.mark.parametrize("count", [10, 30, 100])
 def test_unpaired_differences_of_unlike_spreads(count: int) -> None:
     found = coverage(
-        lambda r: difference(r.normal(0, 1, count), r.normal(2, 3, count), LEVEL).unpaired, 2.0
+        lambda r: estimate_difference(r.normal(0, 1, count), r.normal(2, 3, count), LEVEL).unpaired,
+        2.0,
     )
     assert 0.93 <= found <= 0.97
 
@@ -121,7 +130,7 @@ def test_paired_differences_of_events(count: int, up: float, down: float) -> Non
     def paired(random: Random) -> Estimate:
         u = random.random(count)
         first, second = (u < down) * 1.0, ((u > 1.0 - up) * 1.0)
-        return difference(first, second, LEVEL, kind="event").paired
+        return estimate_difference(first, second, LEVEL, kind="event").paired
 
     found = coverage(paired, up - down)
     rare = (up + down) * count < 10
@@ -133,10 +142,10 @@ def test_paired_differences_of_events(count: int, up: float, down: float) -> Non
 def test_unpaired_differences_of_events(count: int, one: float, other: float) -> None:
     def unpaired(random: Random) -> Estimate:
         first, second = (random.random(count) < one) * 1.0, (random.random(count) < other) * 1.0
-        return difference(first, second, LEVEL, kind="event").unpaired
+        return estimate_difference(first, second, LEVEL, kind="event").unpaired
 
     assert 0.93 <= coverage(unpaired, other - one) <= 0.995
-    alike = difference(np.ones(count), np.ones(count), LEVEL, kind="event").unpaired
+    alike = estimate_difference(np.ones(count), np.ones(count), LEVEL, kind="event").unpaired
     # Agresti and Caffo: (count + 1) / (count + 2) of both, and no point.
     p = (count + 1) / (count + 2)
     assert alike.high == pytest.approx(
@@ -147,9 +156,9 @@ def test_unpaired_differences_of_events(count: int, one: float, other: float) ->
 
 def test_where_no_unit_differs_outcomes_may_still_differ_elsewhere() -> None:
     same = np.ones(60)
-    found = difference(same, same, LEVEL, kind="event").paired
+    found = estimate_difference(same, same, LEVEL, kind="event").paired
     assert found.value == 0.0 and -0.06 < found.low < -0.03 and 0.03 < found.high < 0.06
-    numbers = difference(same, same, LEVEL).paired
+    numbers = estimate_difference(same, same, LEVEL).paired
     assert numbers.low == numbers.high == 0.0
 
 
@@ -158,7 +167,7 @@ def test_latin_hypercubes_are_never_too_narrow() -> None:
     random, held = np.random.default_rng(4), 0
     for seed in range(ROUNDS // 4):
         values = np.array([float(draw.value(seed, k, 20)) for k in range(20)])
-        e = mean(values + random.normal(0.0, 1.0, 20), LEVEL)
+        e = estimate_mean(values + random.normal(0.0, 1.0, 20), LEVEL)
         held += e.low <= 0.5 <= e.high
     assert held / (ROUNDS // 4) >= 0.93
 
@@ -168,7 +177,11 @@ def test_cells_that_stop_when_their_interval_is_narrow(half_width: float, event:
     def stopped(random: Random) -> Estimate:
         values = (random.random(200) < 0.1) * 1.0 if event else random.normal(0.1, 1.0, 200)
         for end in range(10, 201, 10):
-            e = share(values[:end], np.ones(end), LEVEL) if event else mean(values[:end], LEVEL)
+            e = (
+                estimate_share(values[:end], np.ones(end), LEVEL)
+                if event
+                else estimate_mean(values[:end], LEVEL)
+            )
             if e.half_width <= half_width:
                 return e
         return e
@@ -250,7 +263,7 @@ def test_of_these_encounters_alone_an_interval_is_too_wide_never_too_narrow() ->
     own = random.normal(7.0, 1.0, (25, 1))
     held = 0
     for _ in range(ROUNDS // 2):
-        e = mean((own + random.normal(0.0, 1.0, (25, 4))).mean(axis=1), LEVEL)
+        e = estimate_mean((own + random.normal(0.0, 1.0, (25, 4))).mean(axis=1), LEVEL)
         held += e.low <= own.mean() <= e.high
     assert held / (ROUNDS // 2) >= 0.97
 

@@ -10,13 +10,13 @@ from dsa_des.results.labels import (
     AxisName,
     axis_label,
     format_with_interval,
-    readable,
+    readable_label,
     unit_of,
     value_label,
 )
 from dsa_des.results.printing import round_estimate
 from dsa_des.results.record import NUMBER, Result
-from dsa_des.results.report import _line
+from dsa_des.results.report import _summary_cells
 from dsa_des.results.summary import Line
 
 
@@ -32,38 +32,45 @@ from dsa_des.results.summary import Line
     ],
 )
 def test_wilson_gives_newcombes_table(successes: int, trials: int, low: float, high: float) -> None:
-    assert statistics.wilson(successes, trials, 0.95) == pytest.approx((low, high), abs=5e-5)
+    assert statistics.wilson_interval(successes, trials, 0.95) == pytest.approx(
+        (low, high), abs=5e-5
+    )
 
 
 def test_a_mean_of_fractions_and_a_difference_of_shares_have_possible_intervals() -> None:
     values = np.array([1.0] * 10 + [0.75, 0.9, 0.8, 0.2])
-    told, plain = statistics.fraction(values, 0.95), statistics.mean(values, 0.95)
+    told, plain = (
+        statistics.estimate_bounded_mean(values, 0.95),
+        statistics.estimate_mean(values, 0.95),
+    )
     assert plain.high > 1.0 > told.high > told.value == plain.value > told.low > 0.0
     # As wide as Student's in the middle; at an end where all are alike each is a trial of Wilson's.
     half = np.array([0.4, 0.5, 0.6, 0.45, 0.55] * 20)
-    both = statistics.fraction(half, 0.95), statistics.mean(half, 0.95)
+    both = statistics.estimate_bounded_mean(half, 0.95), statistics.estimate_mean(half, 0.95)
     assert both[0].half_width == pytest.approx(both[1].half_width, rel=0.01)
-    alike = statistics.fraction(np.ones(20), 0.95)
+    alike = statistics.estimate_bounded_mean(np.ones(20), 0.95)
     assert (alike.low, alike.high) == pytest.approx((1.0 - 0.1611, 1.0), abs=5e-5)
-    found = differences.difference(np.zeros(3), np.array([0.9, 0.2, 1.0]), 0.95, kind="fraction")
+    found = differences.estimate_difference(
+        np.zeros(3), np.array([0.9, 0.2, 1.0]), 0.95, kind="fraction"
+    )
     assert (found.paired.high, found.unpaired.high) == (1.0, 1.0) and found.paired.value < 0.8
 
 
 def test_missing_values_are_counted_and_left_out() -> None:
     first = np.array([1.0, np.nan, 3.0, 4.0])
     second = np.array([2.0, 2.0, np.nan, 6.0])
-    found = differences.difference(first, second, 0.95)
+    found = differences.estimate_difference(first, second, 0.95)
     assert (found.paired.count, found.only_first, found.only_second) == (2, 1, 1)
     assert found.paired.value == 1.5
-    assert math.isnan(statistics.mean(np.array([np.nan]), 0.95).value)
+    assert math.isnan(statistics.estimate_mean(np.array([np.nan]), 0.95).value)
 
 
 def test_few_values_are_marked() -> None:
-    assert statistics.mean(np.arange(9.0), 0.95).few
-    assert not statistics.mean(np.arange(10.0), 0.95).few
-    one = statistics.mean(np.array([4.0]), 0.95)
+    assert statistics.estimate_mean(np.arange(9.0), 0.95).few
+    assert not statistics.estimate_mean(np.arange(10.0), 0.95).few
+    one = statistics.estimate_mean(np.array([4.0]), 0.95)
     assert one.value == 4.0 and math.isnan(one.low) and one.few
-    assert statistics.share(np.array([3.0]), np.array([5.0]), 0.95).few
+    assert statistics.estimate_share(np.array([3.0]), np.array([5.0]), 0.95).few
 
 
 @pytest.mark.parametrize(
@@ -103,10 +110,10 @@ def test_differences_are_written_to_two_digits_of_half_their_interval(
 
 
 def test_axes_of_figures_carry_units() -> None:
-    assert readable("declaration_range_m.radar") == "Declaration range, radar (m)"
-    assert readable("track_breaks") == "Track breaks"
-    assert readable("track_nees") == "Track NEES"
-    assert readable("fused_share.ir_with_radar") == "Fused share, IR with radar"
+    assert readable_label("declaration_range_m.radar") == "Declaration range, radar (m)"
+    assert readable_label("track_breaks") == "Track breaks"
+    assert readable_label("track_nees") == "Track NEES"
+    assert readable_label("fused_share.ir_with_radar") == "Fused share, IR with radar"
     assert axis_label("radar.scan_rate_hz") == "Radar scan rate (Hz)"
     assert axis_label("swap.fusion") == "Type of fusion"
     assert axis_label("weather.rain_mm_per_h") == "Weather rain (mm/h)"
@@ -136,5 +143,5 @@ def test_a_line_of_the_report_is_in_words_and_rounded_or_as_its_table_has_it(
     estimate = statistics.Estimate(1234.567, 1200.1, 1269.03, 12, True)
     result = Result("declaration_range_m.radar", NUMBER, "true slant range then, m")
     line = Line((5.0, "x"), result, estimate, 2, 1250.0, runs=14, cut_off=(("never", 2),))
-    cells = _line(line, exact) if exact else _line(line)
+    cells = _summary_cells(line, exact) if exact else _summary_cells(line)
     assert cells == ("5", "x", *said, 12, 2, "few", "2 of 14 never", "1250")

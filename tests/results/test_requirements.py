@@ -12,7 +12,7 @@ from dsa_des.errors import SceneError
 from dsa_des.results import figures
 from dsa_des.results.record import NUMBER, Requirement, Result
 from dsa_des.results.statistics import Estimate
-from dsa_des.results.summary import Line, answers, one_sided_confidence
+from dsa_des.results.summary import Line, cheapest_values, one_sided_confidence
 from dsa_des.studies.study_file import read_study
 
 ROOT = Path(__file__).parents[2]
@@ -40,17 +40,17 @@ def lines(*highs: float) -> list[Line]:
 def test_the_cheapest_and_all_dearer_ones_keep_their_intervals_within_the_limit(
     highs, value, estimated, uneven
 ) -> None:
-    (found,) = answers(Requirement("risk", "range", 0.5), ["range", "name"], lines(*highs))
+    (found,) = cheapest_values(Requirement("risk", "range", 0.5), ["range", "name"], lines(*highs))
     assert (found.value, found.estimated, found.uneven) == (value, estimated, uneven)
     assert found.at == ("x",)
     assert found.line.at[0] == (value or 4.0)  # what the dearest comes to where none will do
     # The other end of the axis is the cheap one: the same intervals in the other order.
-    turned = answers(
+    turned = cheapest_values(
         Requirement("risk", "range", 0.5, cheap_last=True), ["range", "name"], lines(*highs[::-1])
     )[0]
     assert turned.value == (None if value is None else 5.0 - value)
     # At least: the lower end counts.
-    least = answers(Requirement("risk", "range", -0.1, below=False), ["range", "name"],
+    least = cheapest_values(Requirement("risk", "range", -0.1, below=False), ["range", "name"],
                     lines(0.2, 0.4, 0.6, 0.7))[0]  # fmt: skip
     assert least.value == 3.0 and least.estimated == 1.0
 
@@ -58,7 +58,7 @@ def test_the_cheapest_and_all_dearer_ones_keep_their_intervals_within_the_limit(
 def test_an_interval_of_too_few_values_meets_nothing() -> None:
     some = lines(0.4, 0.4, 0.4)
     some[1] = replace(some[1], estimate=replace(some[1].estimate, few=True))
-    (found,) = answers(Requirement("risk", "range", 0.5), ["range", "name"], some)
+    (found,) = cheapest_values(Requirement("risk", "range", 0.5), ["range", "name"], some)
     assert (found.value, found.estimated) == (3.0, 1.0)
 
 

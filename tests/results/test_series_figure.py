@@ -36,7 +36,7 @@ def test_bounds_are_those_of_the_mean_of_as_many_runs():
     """Of one run and of 60: quantiles of chi-square with 6 and with 360 degrees."""
     lines = [Line((), None, Estimate(6.0, 5.0, 7.0, n, False), 0, None) for n in (1, 60, 0)]
     axes = Axes()
-    curves._bounds(axes, [1.0, 2.0, 3.0], lines, 6.0, 0.95)
+    curves._draw_bounds(axes, [1.0, 2.0, 3.0], lines, 6.0, 0.95)
     for k, n in enumerate((1, 60)):
         np.testing.assert_allclose([axes.low[k], axes.high[k]], chi2.ppf([0.025, 0.975], 6 * n) / n)
     assert np.isnan(axes.low[2]) and axes.middle == 6.0

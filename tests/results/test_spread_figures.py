@@ -12,8 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from dsa_des.cli import main
-from dsa_des.record.drawing import drawing, fit_axes_to_texts
-from dsa_des.results.curves import _dodge, _edges, draw_cdf, draw_polar
+from dsa_des.record.drawing import draw_to_png, fit_axes_to_texts
+from dsa_des.results.curves import _bin_edges, _shift_series, draw_cdf, draw_polar
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.results.statistics import Estimate
 from dsa_des.results.summary import Line
@@ -98,11 +98,11 @@ def test_what_a_spread_cannot_show_is_said_before_anything_runs(
 
 def test_bins_cover_every_value() -> None:
     values = np.array([3.0, -1.0, 8.0, 8.0])
-    edges = _edges(values, 4)
+    edges = _bin_edges(values, 4)
     assert np.histogram(values, edges)[0].sum() == 4
-    assert np.histogram(np.full(3, 7.0), _edges(np.full(3, 7.0), 3))[0].sum() == 3
-    assert len(_edges(np.empty(0), 0)) == 2
-    assert len(_edges(np.linspace(0, 1, 10**6), 10**6)) == 41
+    assert np.histogram(np.full(3, 7.0), _bin_edges(np.full(3, 7.0), 3))[0].sum() == 3
+    assert len(_bin_edges(np.empty(0), 0)) == 2
+    assert len(_bin_edges(np.linspace(0, 1, 10**6), 10**6)) == 41
 
 
 def test_without_figures_nothing_of_matplotlib_is_imported(small: Path) -> None:
@@ -127,11 +127,11 @@ sys.exit(any(name.partition(".")[0] == "matplotlib" for name in sys.modules))
 
 def test_no_tick_has_an_offset_and_intervals_of_two_series_stand_side_by_side(tmp_path):
     drawn = io.BytesIO()
-    with drawing(4.0, 3.0, drawn) as figure:
+    with draw_to_png(4.0, 3.0, drawn) as figure:
         axes = figure.subplots()
         first, second = (axes.errorbar([1, 2], [0.02499, 0.025], yerr=1e-5) for _ in range(2))
-        _dodge(axes, first.get_children(), 0, 2)
-        _dodge(axes, second.get_children(), 1, 2)
+        _shift_series(axes, first.get_children(), 0, 2)
+        _shift_series(axes, second.get_children(), 1, 2)
         figure.canvas.draw()
         assert axes.yaxis.get_offset_text().get_text() == ""
         assert any(one.get_text().startswith("0.02499") for one in axes.get_yticklabels())

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dsa_des.results.differences import difference
-from dsa_des.results.statistics import FEW, mean, share
+from dsa_des.results.differences import estimate_difference
+from dsa_des.results.statistics import FEW, estimate_mean, estimate_share
 
 RNG = np.random.default_rng(4)
 NORMAL = RNG.normal(3.0, 2.0, 24)
@@ -19,7 +19,7 @@ WIDE = RNG.normal(1.0, 9.0, 24)
 @pytest.mark.parametrize("count", [2, 5, 24])
 def test_a_mean_has_student_s_interval(count, confidence):
     values = NORMAL[:count]
-    found = mean(values, confidence)
+    found = estimate_mean(values, confidence)
     expected = stats.ttest_1samp(values, 0.0).confidence_interval(confidence)
     assert found.value == pytest.approx(np.mean(values))
     assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
@@ -30,18 +30,20 @@ def test_a_mean_has_student_s_interval(count, confidence):
 def test_means_and_differences_of_the_largest_numbers_are_those_of_small_ones(method):
     """Times a power of two, which changes no digit; sums of such values are beyond the largest."""
     large = 2.0**1019
-    small, found = (mean(unit * NORMAL, 0.95, method) for unit in (1.0, large))
+    small, found = (estimate_mean(unit * NORMAL, 0.95, method) for unit in (1.0, large))
     assert [large * end for end in (small.value, small.low, small.high)] == [
         found.value, found.low, found.high,
     ]  # fmt: skip
-    plain, far = (difference(unit * NORMAL, unit * OTHER, 0.95, method) for unit in (1.0, large))
+    plain, far = (
+        estimate_difference(unit * NORMAL, unit * OTHER, 0.95, method) for unit in (1.0, large)
+    )
     assert far.paired.half_width == large * plain.paired.half_width
     assert far.unpaired.half_width == large * plain.unpaired.half_width
 
 
 @pytest.mark.parametrize("second", [OTHER, WIDE])
 def test_a_difference_is_the_second_less_the_first_paired_and_not(second):
-    found = difference(NORMAL, second, 0.95)
+    found = estimate_difference(NORMAL, second, 0.95)
     paired = stats.ttest_rel(second, NORMAL).confidence_interval(0.95)
     assert found.paired.value == pytest.approx(np.mean(second) - np.mean(NORMAL))
     assert (found.paired.low, found.paired.high) == pytest.approx((paired.low, paired.high))
@@ -65,7 +67,7 @@ def wilson(value: float, trials: float) -> tuple[float, float]:
 def test_a_share_of_lone_trials_has_wilson_s_interval(won):
     """Where the trials differ their spread is estimated, which takes one of them."""
     successes = np.array([1.0] * won + [0.0] * (20 - won))
-    found = share(successes, np.ones(20), 0.95)
+    found = estimate_share(successes, np.ones(20), 0.95)
     known = stats.binomtest(won, 20).proportion_ci(0.95, method="wilson")
     assert wilson(won / 20, 20) == pytest.approx((known.low, known.high), abs=1e-9)
     expected = (known.low, known.high) if won in (0, 20) else wilson(won / 20, 19)
@@ -77,7 +79,7 @@ def test_trials_that_hang_together_count_as_fewer():
     """Bunches of unlike size: the ratio's spread from bunch to bunch, with Student's t."""
     trials = np.array([30.0, 3.0, 12.0, 8.0] * 6)
     successes = np.floor(trials * RNG.uniform(0.0, 1.0, len(trials)))
-    found = share(successes, trials, 0.95)
+    found = estimate_share(successes, trials, 0.95)
     count, total = len(trials), trials.sum()
     value = successes.sum() / total
     assert found.value == pytest.approx(value)
@@ -92,10 +94,10 @@ def test_trials_that_hang_together_count_as_fewer():
 
 def test_the_bootstrap_agrees_for_normal_values_and_leans_for_skewed_ones():
     values = np.random.default_rng(1).normal(0.0, 1.0, 400)
-    plain, resampled = mean(values, 0.9), mean(values, 0.9, "bootstrap")
+    plain, resampled = estimate_mean(values, 0.9), estimate_mean(values, 0.9, "bootstrap")
     width = plain.high - plain.low
     assert resampled.low == pytest.approx(plain.low, abs=0.07 * width)
     assert resampled.high == pytest.approx(plain.high, abs=0.07 * width)
     skewed = np.random.default_rng(2).exponential(1.0, 30) ** 2
-    found = mean(skewed, 0.95, "bootstrap")
+    found = estimate_mean(skewed, 0.95, "bootstrap")
     assert found.high - found.value > 1.3 * (found.value - found.low)

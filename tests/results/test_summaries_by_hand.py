@@ -7,11 +7,11 @@ import pyarrow as pa
 import pytest
 from scipy import stats
 
-from dsa_des.commands.what_changed import ConditionPair, say_what_changed
+from dsa_des.commands.what_changed import ConditionPair, print_changes
 from dsa_des.costs.replay import median_and_spread
-from dsa_des.results.differences import _estimate_by_shares, difference
+from dsa_des.results.differences import _estimate_by_shares, estimate_difference
 from dsa_des.results.record import NUMBER, SHARE, TRIALS, Result
-from dsa_des.results.statistics import rare
+from dsa_des.results.statistics import estimate_rare_mean
 from dsa_des.results.summary import compare_axis, summarise
 from tests.results.conftest import rows_of_table
 
@@ -84,7 +84,7 @@ def said_of(first, second, capsys):
     runs = table(rate=[1] * 4 + [2] * 4, replica=[0, 1, 2, 3] * 2, x=[*first, *second])
     tables = SimpleNamespace(rows=rows_of_table(runs, ["rate"], []))
     sides = ConditionPair(tables, np.arange(4), tables, np.arange(4, 8))
-    say_what_changed(("a", "b"), [("", sides)], [NUMBERED])
+    print_changes(("a", "b"), [("", sides)], [NUMBERED])
     return capsys.readouterr().out
 
 
@@ -92,11 +92,11 @@ def test_what_differs_by_rounding_only_has_not_changed(capsys):
     assert EXACT != ROUNDED
     assert "1 other results are the same in every run" in said_of(EXACT, ROUNDED, capsys)
     assert "changed: x" in said_of(EXACT, [*ROUNDED[:3], 0.81], capsys)
-    found = difference(np.array(EXACT), np.array(ROUNDED), 0.95)
+    found = estimate_difference(np.array(EXACT), np.array(ROUNDED), 0.95)
     assert (found.paired.value, found.paired.low, found.paired.high) == (0.0, 0.0, 0.0)
     assert found.unpaired.value == 0.0
     # Small numbers that differ are no rounding, whatever their size.
-    small = difference(1e-20 * np.array(EXACT), 2e-20 * np.array(EXACT), 0.95)
+    small = estimate_difference(1e-20 * np.array(EXACT), 2e-20 * np.array(EXACT), 0.95)
     assert small.paired.value == pytest.approx(1e-20 * np.mean(EXACT))
 
 
@@ -111,15 +111,15 @@ def test_medians_and_half_the_quartiles_distance() -> None:
 def test_the_mean_of_rare_probabilities_by_hand() -> None:
     """Student's t of one degree is 12.706; half of it times the distance is the half-width."""
     nan, some = float("nan"), np.array([1e-4, float("nan"), 3e-4])
-    found = rare(some, np.full(3, 1e-3), 0.95)
+    found = estimate_rare_mean(some, np.full(3, 1e-3), 0.95)
     factor = np.exp(12.7062 * 1e-4 / 2e-4)
     assert (found.value, found.count) == (pytest.approx(2e-4), 2)
     assert found.low == pytest.approx(2e-4 / factor, rel=1e-4)
     assert found.high == pytest.approx(2e-4 * factor, rel=1e-4)
-    alone = rare(np.array([1e-4, nan]), np.full(2, 1e-3), 0.95)
+    alone = estimate_rare_mean(np.array([1e-4, nan]), np.full(2, 1e-3), 0.95)
     assert alone.value == 1e-4 and np.isnan([alone.low, alone.high]).all()
     # None was seen in two: 3.689 events are as rare as an end may err; each adds 0.002 to one.
-    none = rare(np.zeros(2), np.array([1e-3, 3e-3]), 0.95)
+    none = estimate_rare_mean(np.zeros(2), np.array([1e-3, 3e-3]), 0.95)
     assert (none.value, none.low) == (0.0, 0.0)
     assert none.high == pytest.approx(-np.log(0.025) * 2e-3 / 2)
 

@@ -5,7 +5,7 @@ import pytest
 import dsa_des
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.study_file import read_study
@@ -239,7 +239,7 @@ def test_an_item_has_a_name_on_the_command_line(write, key, place):
 @pytest.mark.parametrize("item", ["head_on", '"head_on"', "0", "N12.3"])
 def test_an_item_has_a_name_in_replicas(write, item):
     scene = load_scene(write(""), sets=["blocks.traffic.intruders[1].name=N12.3"])
-    changed = scene_of(scene, Replica(1, {f"blocks.traffic.intruders.{item}.east_m": 5.0}))
+    changed = replica_scene(scene, Replica(1, {f"blocks.traffic.intruders.{item}.east_m": 5.0}))
     assert east_m(changed, int(item == "N12.3")) == 5
 
 
@@ -293,7 +293,7 @@ def test_unknown_and_ambiguous_names(write):
         load_scene(write(""), sets=["blocks.traffic.intruders.head_of.east_m=1"])
     scene = load_scene(write(""))
     with pytest.raises(SceneError, match=r"no item 'head_of'.* did you mean 'head_on'"):
-        scene_of(scene, Replica(1, {"blocks.traffic.intruders.head_of.east_m": 1.0}))
+        replica_scene(scene, Replica(1, {"blocks.traffic.intruders.head_of.east_m": 1.0}))
     twice = [
         "blocks.traffic.intruders[1].name=head_on",
         "blocks.traffic.intruders.head_on.east_m=1",
@@ -313,7 +313,7 @@ def test_studies_address_items_by_name(write, tmp_path):
     )
     read = read_study(study)
     assert [east_m(read.scene(cell), 0) for cell in range(2)] == [1000, 2000]
-    drawn = scene_of(read.scene(0), read.replica(1)).blocks["traffic"].parameters.intruders[0]
+    drawn = replica_scene(read.scene(0), read.replica(1)).blocks["traffic"].parameters.intruders[0]
     assert 0 < float(drawn.north_m) <= 5
     assert float(drawn.speed_mps) == 80
     with study.open("a") as file:

@@ -14,7 +14,7 @@ from wired import chain, rows, run, sensor
 import dsa_des
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.running.simulation import Simulation
 
 PFA, SCANS, COUNT = 1e-3, 2000, 50
@@ -62,7 +62,7 @@ def mean_snr(mode: str) -> np.ndarray:
 def test_targets_are_detected_as_often_as_the_model_says(together):
     if together:
         scenes = [dsa_des.load_scene(scene(seed)) for seed in (5, 6)]
-        scans = counted(lambda **options: lock_step(scenes, **options))
+        scans = counted(lambda **options: make_lockstep_simulation(scenes, **options))
     else:
         scans = counted(lambda **options: Simulation(dsa_des.load_scene(scene(4)), **options))
     looks = SCANS * COUNT * (2 if together else 1)

@@ -6,7 +6,7 @@ import pytest
 
 from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import Recorder
-from dsa_des.record.run_folder import with_columns_of_rows
+from dsa_des.record.run_folder import join_row_columns
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
@@ -88,7 +88,7 @@ class Made(SimpleNamespace):
     """What a run made; `made["detections"]` has the ownship's pose, as a `Run` has it."""
 
     def __getitem__(self, table):
-        return with_columns_of_rows(self.tables, table)
+        return join_row_columns(self.tables, table)
 
 
 class Runs:

@@ -14,7 +14,7 @@ from dsa_des.cli import main
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.running.simulation import Simulation
 from dsa_des.time.changing_clock import ChangingClock
 from dsa_des.time.clock import ClockSpec
@@ -207,7 +207,7 @@ def test_a_change_at_the_start_is_what_the_scene_begins_as():
     """What a block makes at its first wake is not there yet to go on from."""
     key = "blocks.radar.range_km"
     whole = same_in_any_window(scene(change(key, 4.5, at_s=0), tracks=True))
-    begun = scene_of(scene(tracks=True), Replica(3, {key: 4.5}))
+    begun = replica_scene(scene(tracks=True), Replica(3, {key: 4.5}))
     for name, table in tables_of(begun)[1].items():
         assert rows_of(whole[name], lambda t: t >= 0).equals(rows_of(table, lambda t: t >= 0)), name
     assert whole["alerts"].num_rows

@@ -9,7 +9,7 @@ import dsa_des
 from docs.make.outages.__main__ import link_rows, moment_rows, risk_rows
 from dsa_des.cli import main
 from dsa_des.files.toml_files import to_toml
-from dsa_des.replicas.times_out import times_out_s
+from dsa_des.replicas.times_out import outage_times_of_seeds
 
 
 def runs_of(folder, *words, replicas):
@@ -86,7 +86,7 @@ def test_a_link_that_fails_leaves_more_of_the_risk_and_fine_runs_as_they_were(tm
         one = dsa_des.load_scene("link_fails", sets=[
             f"outages[0].mean_between_s={mean_s}", f"outages[0].mean_repair_s={repair_s}"
         ])  # fmt: skip
-        out = times_out_s(one, mine.seed.tolist(), np.full(len(mine), 180.0))["pilot"]
+        out = outage_times_of_seeds(one, mine.seed.tolist(), np.full(len(mine), 180.0))["pilot"]
         for number, spans in enumerate(out):
             alike = mine[flown].iloc[number].equals(never[flown].iloc[number])
             assert len(spans) or alike

@@ -12,12 +12,12 @@ from dsa_des.studies.allocation import (
     PREDICTED_FROM,
     Allocation,
     ForeseenRuns,
-    best_size,
-    chances,
+    best_sample_size,
     draw_runs,
+    event_chances,
     fit_chances,
     flight_probabilities,
-    learn,
+    learn_allocation,
     remaining_variance,
     round_ends,
 )
@@ -71,7 +71,7 @@ def allocated(
     for end in round_ends(len(stands_for), None):
         known = slice(start or end)
         least = LEAST if start else FIRST_LEAST
-        plan = learn(part_of(runs, known), happened[:, known], stands_for[known], least)
+        plan = learn_allocation(part_of(runs, known), happened[:, known], stands_for[known], least)
         here = part_of(runs, slice(start, end))
         stands_for[start:end] = draw_runs(plan.probabilities(here), rng.uniform(size=end - start))[
             1
@@ -168,18 +168,20 @@ def test_no_event_one_event_and_encounters_that_are_all_alike() -> None:
     rng = np.random.default_rng(3)
     runs, happened = encounters(rng, PILOT)
     for seen in (np.zeros_like(happened), np.eye(1, PILOT)):
-        plan = learn(runs, seen, np.ones(PILOT))
+        plan = learn_allocation(runs, seen, np.ones(PILOT))
         chance = plan.probabilities(runs)
         assert ((chance >= LEAST) & (chance <= 1.0)).all()
         # What is nominal is flown before what passes far away.
         assert chance[runs.nominal[0] > 0.0].min() > chance[runs.geometry[0] > 3.0].max()
     alike = ForeseenRuns(np.ones((2, 50)), np.ones((1, 50)), np.full((1, 50), 0.2), np.ones(50))
-    plan = learn(alike, np.zeros((1, 50)), np.ones(50))
+    plan = learn_allocation(alike, np.zeros((1, 50)), np.ones(50))
     assert np.unique(plan.probabilities(alike)).size == 1
     never = ForeseenRuns(
         np.full((2, 50), np.nan), np.zeros((1, 50)), np.zeros((1, 50)), np.ones(50)
     )
-    assert np.isfinite(learn(never, np.zeros((1, 50)), np.ones(50)).probabilities(never)).all()
+    assert np.isfinite(
+        learn_allocation(never, np.zeros((1, 50)), np.ones(50)).probabilities(never)
+    ).all()
 
 
 def test_weights_over_six_orders_of_magnitude_stay_finite_and_the_heavy_are_flown() -> None:
@@ -188,7 +190,7 @@ def test_weights_over_six_orders_of_magnitude_stay_finite_and_the_heavy_are_flow
     heavy = ForeseenRuns(
         runs.geometry, runs.nominal, runs.expected, 10.0 ** rng.uniform(-3, 3, PILOT)
     )
-    chance = learn(heavy, happened, np.ones(PILOT)).probabilities(heavy)
+    chance = learn_allocation(heavy, happened, np.ones(PILOT)).probabilities(heavy)
     assert np.isfinite(chance).all() and chance.min() >= LEAST
     inside = heavy.nominal[0] > 0.0
     order = np.argsort(heavy.weight[inside])
@@ -208,7 +210,9 @@ def test_the_size_of_the_probabilities_has_the_least_variance_times_cost() -> No
         variance = (many * p / pi).sum() + many[0] * (ratio**2 - 2.0 * ratio * p[0])
         return float(variance * ((many * pi).sum() / 1000 + FORESEEN_COST))
 
-    precision, size = best_size(runs, np.repeat(p, many)[np.newaxis], np.array([False]), LEAST)
+    precision, size = best_sample_size(
+        runs, np.repeat(p, many)[np.newaxis], np.array([False]), LEAST
+    )
     mine = flight_probabilities(np.sqrt(precision[0] * p), size, LEAST)
     grid = np.linspace(LEAST, 1.0, 98)
     best = min(cost(np.array([a, b])) for a in grid for b in grid)
@@ -245,7 +249,7 @@ def test_what_was_expected_is_believed_no_more_where_it_is_wrong() -> None:
     none = np.zeros((1, 600))
     fitted = fit_chances(none, expected, happened, np.ones(600))
     runs = ForeseenRuns(none, none, expected[np.newaxis], np.ones(600))
-    chance = chances(none, runs, np.stack([fitted, fitted])[np.newaxis])[0]
+    chance = event_chances(none, runs, np.stack([fitted, fitted])[np.newaxis])[0]
     assert chance.min() > 0.1 and chance.max() < 0.35
 
 
@@ -305,7 +309,10 @@ def test_an_event_that_was_seen_often_is_predicted_and_the_sure_are_flown_less()
     runs, happened = encounters(rng, 2000, kind="loss")
     few = np.where(np.arange(2000) < 60, 1.0, 0.0)
     assert happened[0, :60].sum() < PREDICTED_FROM < happened.sum()
-    unsure, sure = learn(runs, happened, few), learn(runs, happened, np.ones(2000))
+    unsure, sure = (
+        learn_allocation(runs, happened, few),
+        learn_allocation(runs, happened, np.ones(2000)),
+    )
     assert not unsure.predictions(runs).any()
     truth = np.where(runs.geometry[1] > 0.6, 0.7, 0.35)[runs.nominal[0] > 0.0]
     found = sure.predictions(runs)[0][runs.nominal[0] > 0.0]

@@ -14,8 +14,8 @@ from dsa_des.cli import main
 from dsa_des.results.folder import StudyFolder, failure_counts_of_part
 from dsa_des.results.record import CRASHED, DONE
 from dsa_des.studies import executors
-from dsa_des.studies.attempts import TRIES, Attempts, halves
-from dsa_des.studies.chunk import Done, done_of, join_pieces
+from dsa_des.studies.attempts import TRIES, Attempts, split_chunk
+from dsa_des.studies.chunk import ChunkResult, join_pieces, make_chunk_result
 from dsa_des.studies.executors import Local
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import run_study
@@ -136,16 +136,17 @@ class _Process:
         module = "dsa_des.studies.attempts"
         monkeypatch.setattr(f"{module}.join_pieces", lambda name, parts: self.sum(name, parts))
         monkeypatch.setattr(
-            f"{module}.crashed_run", lambda study, chunk, tries: Done(chunk.name, b"", 1, 1, 1)
+            f"{module}.crashed_run",
+            lambda study, chunk, tries: ChunkResult(chunk.name, b"", 1, 1, 1),
         )
         self.deaths: list[Chunk] = []
 
     @staticmethod
-    def sum(name: str, parts: list[Done]) -> Done:
-        return Done(name, b"", sum(p.runs for p in parts), 0, sum(p.crashed for p in parts))
+    def sum(name: str, parts: list[ChunkResult]) -> ChunkResult:
+        return ChunkResult(name, b"", sum(p.runs for p in parts), 0, sum(p.crashed for p in parts))
 
-    def all(self, *together: tuple[Chunk, ...], guilty: set[int]) -> list[Done]:
-        attempts, found = Attempts(None, together), list[Done]()  # type: ignore[arg-type]
+    def all(self, *together: tuple[Chunk, ...], guilty: set[int]) -> list[ChunkResult]:
+        attempts, found = Attempts(None, together), list[ChunkResult]()  # type: ignore[arg-type]
         while (piece := attempts.next_piece()) is not None:
             runs = [run for chunk in piece.chunks for run in chunk.runs]
             if {k for _, start, end in runs for k in range(start, end)} & guilty:
@@ -153,7 +154,7 @@ class _Process:
                 found += attempts.take_back(piece)
             else:
                 found += attempts.finish(
-                    piece, [Done(chunk.name, b"", len(chunk), 0) for chunk in piece.chunks]
+                    piece, [ChunkResult(chunk.name, b"", len(chunk), 0) for chunk in piece.chunks]
                 )
         return found
 
@@ -185,14 +186,14 @@ def test_a_last_try_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     assert first is not None and second is not None
     attempts.take_back(first)
     assert attempts.next_piece() is None  # the other one is still under way
-    attempts.finish(second, [Done("b", b"", 1, 0)])
+    attempts.finish(second, [ChunkResult("b", b"", 1, 0)])
     again = attempts.next_piece()
     assert again is not None and again.chunks[0].name == "a" and attempts.next_piece() is None
 
 
 def test_halves_hold_each_run_once() -> None:
     chunk = Chunk("one", ((0, 3, 5), (1, 0, 4), (2, 7, 8)))
-    first, second = halves(chunk)
+    first, second = split_chunk(chunk)
     runs = [(c, k) for part in (first, second) for c, a, b in part.runs for k in range(a, b)]
     assert runs == [(c, k) for c, a, b in chunk.runs for k in range(a, b)]
     assert (len(first), len(second)) == (3, 4)
@@ -201,9 +202,9 @@ def test_halves_hold_each_run_once() -> None:
 def test_a_part_says_what_its_runs_are_and_what_blocks_could_not_do() -> None:
     """Of four runs one failed and one crashed; what is joined adds up, in order of cells."""
 
-    def part(cells: list[int], status: list[str], undone: dict) -> Done:
+    def part(cells: list[int], status: list[str], undone: dict) -> ChunkResult:
         rows = {"cell": cells, "replica": [0] * len(cells), "status": status}
-        return done_of("part", pa.table(rows), undone)
+        return make_chunk_result("part", pa.table(rows), undone)
 
     what = {"tracker": {"it never had a track": (1, 4)}}
     first = part([3, 1, 2, 0], ["done", "failed", "crashed", "done"], what)

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from dsa_des.block.component import ClockedParameters, Component
 from dsa_des.replicas import drawn_columns as checked
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.replicas.drawn_columns import drawn_columns
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
 from dsa_des.scene.scene import load_scene
@@ -43,7 +43,7 @@ def test_scenes_are_those_of_each_replica_by_itself(small: Path, drawn: dict[str
     together = drawn_columns(base, runs)
     assert together is not None and len(together[2:]) == _MANY - 2
     for number, replica in enumerate(runs):
-        alone = scene_of(base, replica)
+        alone = replica_scene(base, replica)
         for found in (together[number], together[1:][number - 1] if number else together[0]):
             assert found == alone
             for name, block in alone.blocks.items():
@@ -112,7 +112,7 @@ def test_one_that_is_refused_is_refused_with_its_own_words(
 def test_no_scene_is_made_for_each_replica(small: Path, monkeypatch: Any) -> None:
     made: list[Replica] = []
     with monkeypatch.context() as patched:
-        patched.setattr(checked, "scene_of", lambda *a: made.append(a[1]) or scene_of(*a))
+        patched.setattr(checked, "replica_scene", lambda *a: made.append(a[1]) or replica_scene(*a))
         patched.setattr(checked.ReplicaScenes, "__iter__", None)
         found = run_replicas(load_scene("small.toml"), replicas(**SHAPES["offsets"]))
     assert all(isinstance(run, Recorded) for run in found) and len(made) == 3

@@ -10,7 +10,7 @@ from dsa_des.block.message import Text
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.replicas.replicas import Failed, Recorded, lock_step_refusal, run_replicas
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
@@ -89,7 +89,7 @@ def test_a_wrong_change_fails_its_own_replica(
     assert isinstance(good, Recorded) and isinstance(bad, Failed)
     assert message in bad.error
     with pytest.raises(SceneError):
-        scene_of(base, Replica(1, {key: value}))
+        replica_scene(base, Replica(1, {key: value}))
 
 
 def test_drawn_targets_run_one_by_one_and_it_is_said(small: Path) -> None:

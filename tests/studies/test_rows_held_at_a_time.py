@@ -45,10 +45,10 @@ def test_parts_of_a_chunk_give_its_bytes(small: Path, monkeypatch: pytest.Monkey
                 return {}, {0: str(error)}
             return measure_one_by_one(partial(broken, scene, metrics), runs)
 
-    plain = chunks._measure
+    plain = chunks._measure_metrics
     monkeypatch.setattr(chunks, "run_replicas", run)
     monkeypatch.setattr(chunks, "Group", made)
-    monkeypatch.setattr(chunks, "_measure", broken)
+    monkeypatch.setattr(chunks, "_measure_metrics", broken)
     whole = run_chunk(study, Chunk("part", ((0, 0, 16),)))
     assert recorded == [16] and 0 < whole.failed < 16
     monkeypatch.setattr(lock_step_size, "MOST_BYTES", 300e3)

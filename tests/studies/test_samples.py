@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from dsa_des.studies.draws import identity, member_seed
+from dsa_des.studies.draws import axis_value_identity, member_seed
 from dsa_des.studies.identity import record_of
 from dsa_des.studies.study_file import read_study
 from tests.support.encounter_folder import rows_of, write_encounter, write_scene, write_study
@@ -92,7 +92,7 @@ def test_any_axis_can_be_a_sample_and_its_values_are_told_by_themselves(folder: 
         4.0: seeds[4],
     }
     file, reach = study.axes
-    assert identity(reach, 0) == ("4",)
+    assert axis_value_identity(reach, 0) == ("4",)
     assert member_seed(4, [(file, 0), (reach, 1)]) == member_seed(4, [(reach, 1), (file, 0)])
     assert member_seed(4, []) == 4
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from dsa_des.commands.study import finish, run_into
+from dsa_des.commands.study import report_finished_study, run_into
 from dsa_des.errors import UsageError
 from dsa_des.results.folder import NotWritten, StudyFolder
-from dsa_des.results.statistics import wilson
+from dsa_des.results.statistics import wilson_interval
 from dsa_des.studies.executors import Dask, run_and_write
 from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import Stopped, run_study
@@ -42,7 +42,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 def undisturbed(name: str = "alone", repeat: str = "") -> dict[str, bytes]:
     study = read_study("study.toml")
     study.repeat = repeat
-    finish(study, run_into(study, Path(name), 1, False), quiet=True)
+    report_finished_study(study, run_into(study, Path(name), 1, False), quiet=True)
     return contents(Path(name))
 
 
@@ -99,7 +99,7 @@ def test_a_killed_worker_changes_nothing(small: Path) -> None:
     whole = undisturbed()
     flag.unlink()
     study = read_study("study.toml")
-    finish(study, run_into(study, Path("pool"), 2, False), quiet=True)
+    report_finished_study(study, run_into(study, Path("pool"), 2, False), quiet=True)
     assert flag.exists()
     assert contents(Path("pool")) == whole
 
@@ -140,7 +140,7 @@ def test_a_full_disk_leaves_a_resumable_folder(small: Path) -> None:
     done = sorted(path.name for path in Path("full/parts").iterdir())
     assert all(name.endswith(".parquet") and not name.startswith(".") for name in done)
     study = read_study("study.toml")
-    finish(study, run_into(study, Path("full"), 1, True), quiet=True)
+    report_finished_study(study, run_into(study, Path("full"), 1, True), quiet=True)
     assert contents(Path("full")) == whole
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != limit
 
@@ -158,7 +158,7 @@ def test_ctrl_c_leaves_a_resumable_folder(released: Path) -> None:
     assert "continue with" in stderr and "Traceback" not in stderr
     released.touch()
     study = read_study("study.toml")
-    finish(study, run_into(study, Path("stopped"), 1, True), quiet=True)
+    report_finished_study(study, run_into(study, Path("stopped"), 1, True), quiet=True)
     assert contents(Path("stopped")) == whole
 
 
@@ -166,7 +166,7 @@ def test_a_part_that_cannot_be_read_is_run_again(small: Path) -> None:
     whole = undisturbed()
     (Path("alone/parts") / "part-000-000002.parquet").write_bytes(b"torn")
     study = read_study("study.toml")
-    finish(study, run_into(study, Path("alone"), 1, True), quiet=True)
+    report_finished_study(study, run_into(study, Path("alone"), 1, True), quiet=True)
     assert contents(Path("alone")) == whole
 
 
@@ -204,7 +204,7 @@ def test_a_dask_cluster_gives_the_same_bytes_also_when_a_worker_dies(small: Path
         if old is not None:
             os.environ["PYTHONPATH"] = old
     assert flag.exists()
-    finish(study, folder, quiet=True)
+    report_finished_study(study, folder, quiet=True)
     assert contents(Path("dask")) == whole
 
 
@@ -260,7 +260,7 @@ def test_a_cell_stops_when_its_interval_is_narrow_enough(small: Path) -> None:
 
 
 def half_width(values: list[float]) -> float:
-    low, high = wilson(sum(values), len(values), 0.95)
+    low, high = wilson_interval(sum(values), len(values), 0.95)
     return (high - low) / 2
 
 

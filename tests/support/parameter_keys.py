@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.registry import find
+from dsa_des.block.registry import find_component
 from dsa_des.commands.parameters import scene_tables
 from dsa_des.studies.metric import METRICS, find_metric
 
@@ -36,7 +36,7 @@ def every_key() -> set[str]:
     """Return ``TYPE.key`` of blocks, ``[TABLE].key`` of all else, ``[metric NAME].key``."""
     found: set[str] = set()
     for kind in entry_points_of():
-        found |= set(keys_of(find(kind).Parameters, f"{kind}."))
+        found |= set(keys_of(find_component(kind).Parameters, f"{kind}."))
     for table, (_, rows) in scene_tables().items():
         found |= {f"[{table}].{row[0]}" for row in rows()}
     for name in entry_points_of(METRICS):

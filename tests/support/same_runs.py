@@ -7,8 +7,8 @@ import pyarrow.compute as pc
 
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.changed_scene import Replica, replica_scene
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.running.simulation import Simulation
 
 
@@ -18,7 +18,7 @@ def tables_of(scene: Any, runs: int = 1, **options: Any) -> tuple[Simulation, di
     Of a list of scenes it is all of them in lock step.
     """
     sink = MemorySink()
-    kind = lock_step if isinstance(scene, list) else Simulation
+    kind = make_lockstep_simulation if isinstance(scene, list) else Simulation
     simulation = kind(scene, recorder=Recorder([sink], runs=runs), **options)
     simulation.run()
     return simulation, {name: each.combine_chunks() for name, each in sink.tables().items()}
@@ -26,7 +26,7 @@ def tables_of(scene: Any, runs: int = 1, **options: Any) -> tuple[Simulation, di
 
 def replicas_of(scene: Any, *changes: Mapping[str, Any]) -> list[Any]:
     """Return a scene for each set of changes, with seeds of their own."""
-    return [scene_of(scene, Replica(20 + i, change)) for i, change in enumerate(changes)]
+    return [replica_scene(scene, Replica(20 + i, change)) for i, change in enumerate(changes)]
 
 
 def same_as_alone(scenes: Sequence[Any], **options: Any) -> Simulation:

@@ -10,10 +10,10 @@ from same_runs import tables_of
 
 import dsa_des
 from components.surveillance.ads_b import ERRORS
-from dsa_des.costs.replay import run_rung, values_of
+from dsa_des.costs.replay import replay_values, run_rung
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
@@ -131,7 +131,7 @@ def test_stated_variances_are_those_of_the_errors(scene):
     quality = "ads_b = {{ nacp = {}, nacv = 2 }}"
     off = {"azimuth": [], "elevation": [], "range": []}
     loaded = scene(kea=quality.format(7), moa=quality.format(9), duration_s="6")
-    found = tables_of([scene_of(loaded, Replica(seed)) for seed in range(60)])[1]
+    found = tables_of([replica_scene(loaded, Replica(seed)) for seed in range(60)])[1]
     for seed in range(60):
         mine = {
             "detections": found["detections"].filter(pc.equal(found["detections"]["replica"], seed))
@@ -200,7 +200,7 @@ def test_costs_count_how_far_reports_lie_off_all_of_which_come(scene):
     kea = "ads_b = { spoofed_north_m = 3000, spoofed_east_m = -400 }"
     ether = 'position_errors = "none"\ncompact = false'
     here = run_rung(scene(kea=kea, ether=ether, moa="ads_b = {}", duration_s=6), "ether")
-    _, off = values_of(ERRORS, here, here)
+    _, off = replay_values(ERRORS, here, here)
     north_m, east_m = off["north"].T, off["east"].T
     flown = (((3000.0, -400.0), 70.0, 20.0), ((0.0, 0.0), 90.0, 100.0))
     for index, (spoofed_m, speed_mps, heading_deg) in enumerate(flown):

@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 
 from dsa_des.time.gauss_markov import GaussMarkov
-from dsa_des.time.randomness import BranchedSeed, Streams, branch
+from dsa_des.time.randomness import BranchedSeed, Streams, branch_seed
 
 S = 10**9
 SECONDS = np.arange(12)
@@ -19,9 +19,9 @@ def drawn(seeds: list[int], *, timed: bool = True) -> np.ndarray:
 
 
 def test_a_branch_draws_as_its_run_up_to_its_instant():
-    first = branch(1, 5 * S, 77)
+    first = branch_seed(1, 5 * S, 77)
     one, two, late, plain, other = drawn(
-        [first, branch(first, 8 * S, 5), branch(1, 12 * S, 9), 1, 2]
+        [first, branch_seed(first, 8 * S, 5), branch_seed(1, 12 * S, 9), 1, 2]
     )
     np.testing.assert_array_equal(one == plain, SECONDS < 5)
     np.testing.assert_array_equal(two == one, SECONDS < 8)
@@ -31,27 +31,27 @@ def test_a_branch_draws_as_its_run_up_to_its_instant():
 
 
 def test_what_branches_draw_is_what_a_run_of_that_seed_would():
-    (one,) = drawn([branch(1, 5 * S, 77)])
-    np.testing.assert_array_equal(one, drawn([branch(1, 5 * S, 77), 3])[0])
+    (one,) = drawn([branch_seed(1, 5 * S, 77)])
+    np.testing.assert_array_equal(one, drawn([branch_seed(1, 5 * S, 77), 3])[0])
     np.testing.assert_array_equal(one[5:], drawn([77])[0][5:])
 
 
 def test_an_earlier_branch_replaces_the_later_ones():
-    again = branch(branch(1, 8 * S, 5), 3 * S, 7)
+    again = branch_seed(branch_seed(1, 8 * S, 5), 3 * S, 7)
     assert again.branches == ((3 * S, 7),)
     np.testing.assert_array_equal(drawn([again]), drawn([BranchedSeed(1, [(3 * S, 7)])]))
 
 
 def test_what_is_of_no_instant_stays_as_it_is():
-    branched, plain = drawn([branch(1, 5 * S, 77), 1], timed=False)
+    branched, plain = drawn([branch_seed(1, 5 * S, 77), 1], timed=False)
     np.testing.assert_array_equal(branched, plain)
-    stream = Streams(branch(1, 0, 77)).stream("block", "purpose")
+    stream = Streams(branch_seed(1, 0, 77)).stream("block", "purpose")
     once = np.zeros(1, np.uint64), np.zeros(1, np.int64)
     assert stream.uniform(*once) == Streams(1).stream("block", "purpose").uniform(*once)
 
 
 def test_a_branched_seed_is_a_number_that_travels():
-    one = branch(12, 5 * S, 77)
+    one = branch_seed(12, 5 * S, 77)
     assert one == 12 and f"{one}" == "12"
     assert pickle.loads(pickle.dumps(one)).branches == one.branches == ((5 * S, 77),)
 

@@ -9,7 +9,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from dsa_des.time.clock import MAX_TICK, ClockSpec, ScanClock, parse_rational, resolution
+from dsa_des.time.clock import (
+    MAX_TICK,
+    ClockSpec,
+    ScanClock,
+    common_ticks_per_second,
+    parse_rational,
+)
 from dsa_des.time.randomness import Streams
 
 DRAWS = Streams(5).scan_normals("radar", "clock jitter")
@@ -17,7 +23,7 @@ DRAWS = Streams(5).scan_normals("radar", "clock jitter")
 
 def clocks_of(*specs):
     """Return clocks with a common resolution, and that resolution."""
-    ticks_per_s = resolution(time for spec in specs for time in spec.exact_times())
+    ticks_per_s = common_ticks_per_second(time for spec in specs for time in spec.exact_times())
     return [ScanClock(spec, ticks_per_s, DRAWS) for spec in specs], ticks_per_s
 
 
@@ -94,9 +100,9 @@ def test_what_is_no_number_is_refused(value):
 
 
 def test_the_resolution_is_nanoseconds_or_finer():
-    assert resolution([]) == 10**9
-    assert resolution([Fraction(1, 3), Fraction(1001, 30000)]) == 3 * 10**9
-    assert resolution([Fraction(1, 10**10), Fraction(1, 7)]) == 7 * 10**10
+    assert common_ticks_per_second([]) == 10**9
+    assert common_ticks_per_second([Fraction(1, 3), Fraction(1001, 30000)]) == 3 * 10**9
+    assert common_ticks_per_second([Fraction(1, 10**10), Fraction(1, 7)]) == 7 * 10**10
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)

@@ -17,7 +17,7 @@ from docs.make.track_consistency import (
     Case,
     scene_of_case,
 )
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.scene.scene import load_scene
 
 NEARER = [
@@ -150,7 +150,7 @@ def test_late_looks_find_their_tracks_whoever_else_is_there(late):
     )  # fmt: skip
     traffic = {"type": "traffic.scripted", "ownship": OWNSHIP, "intruders": NEARLY}
     one = dsa_des.load_scene({**scene_of_case(case, traffic), "duration_s": 5})
-    scenes = [scene_of(one, Replica(1 + i, {})) for i in range(3)]
+    scenes = [replica_scene(one, Replica(1 + i, {})) for i in range(3)]
     _, together = tracked(scenes)
     _, alone = tracked(scenes[0])
     first = together.filter(pc.equal(together["replica"], 0)).drop_columns(["replica"])

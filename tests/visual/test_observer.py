@@ -11,8 +11,8 @@ import dsa_des
 from components.visual.acquisition import closing_opportunity, round_share
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.changed_scene import Replica, replica_scene
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.running.simulation import Simulation
 
 AREA_M2 = 12.0
@@ -108,7 +108,9 @@ def test_glances_scale_the_search_and_spells_are_all_or_nothing_of_a_run():
     np.testing.assert_allclose(opportunity(run(scene(pilot))), 0.4 * whole, rtol=1e-9)
     spells = dsa_des.load_scene(scene({**pilot, "looking": "spells"}, duration_s=30))
     runs = 300
-    together = tables_of([scene_of(spells, Replica(k, {})) for k in range(runs)], lock_step)
+    together = tables_of(
+        [replica_scene(spells, Replica(k, {})) for k in range(runs)], make_lockstep_simulation
+    )
     seen = len(set(together["detections"]["replica"].to_pylist()))
     expected = 0.4 * -math.expm1(-whole[29])
     assert abs(seen / runs - expected) < 2.6 * math.sqrt(expected * (1 - expected) / runs)
@@ -119,7 +121,9 @@ def test_who_sits_left_and_who_sits_right_attend_each_for_themselves():
     pilot = {"beta_per_sr_s": 1e9, "left_looking": 0.5, "right_looking": 0.5, "looking": "spells"}
     spells = dsa_des.load_scene(scene(pilot, duration_s=3))
     runs = 240
-    together = tables_of([scene_of(spells, Replica(k, {})) for k in range(runs)], lock_step)
+    together = tables_of(
+        [replica_scene(spells, Replica(k, {})) for k in range(runs)], make_lockstep_simulation
+    )
     seen = len(set(together["detections"]["replica"].to_pylist()))
     assert abs(seen / runs - 0.75) < 2.6 * math.sqrt(0.75 * 0.25 / runs)
 
@@ -141,7 +145,9 @@ def test_who_looks_out_in_a_run_sees_all_who_come():
     pilot = {"beta_per_sr_s": 1e9, "left_looking": 0.5, "looking": "spells"}
     both = scene(pilot, [met("a"), met("b", bearing_deg=-20.0)], duration_s=3)
     spells = dsa_des.load_scene(both)
-    found = tables_of([scene_of(spells, Replica(k, {})) for k in range(40)], lock_step)
+    found = tables_of(
+        [replica_scene(spells, Replica(k, {})) for k in range(40)], make_lockstep_simulation
+    )
     seen = found["detections"].to_pylist()
     first, second = ({row["replica"] for row in seen if row["target"] == name} for name in "ab")
     assert first == second and 8 < len(first) < 32

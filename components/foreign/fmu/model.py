@@ -12,7 +12,7 @@ from typing import Any
 
 from components.foreign.fmu.units import Scale, scale_of
 from dsa_des.errors import did_you_mean
-from dsa_des.files.input_files import read_once
+from dsa_des.files.input_files import cache_reads
 
 _KINDS = {"Real": "Float64", "Integer": "Int32"}
 #: Kinds whose values are no numbers.
@@ -140,7 +140,7 @@ class FmuModel:
         return known.factor / to.factor, (known.offset - to.offset) / to.factor
 
 
-@read_once(64)
+@cache_reads(64)
 def read_fmu(path: Path) -> FmuModel:
     """Return the model description of an FMU.
 

@@ -28,7 +28,7 @@ from docs.make.pictures.matched import range_table, size_table
 from docs.make.stamp import stamped
 from dsa_des.block.mark import BLUE, PINK
 from dsa_des.files.output_file import write_file
-from dsa_des.record.drawing import drawing
+from dsa_des.record.drawing import draw_to_png
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.terminal.interruption import plain_ending
@@ -245,7 +245,7 @@ def _page(folder: Path) -> str:
 
 
 def _draw(path: Path, rows: list[Any], bins: list[Any]) -> None:
-    with drawing(9.5, 4.2, path) as figure:
+    with draw_to_png(9.5, 4.2, path) as figure:
         left, right = figure.subplots(1, 2, width_ratios=(3, 2))
         place = np.arange(len(rows))
         left.barh(place - 0.2, [row[1] for row in rows], 0.38, color=BLUE, label="picture")
@@ -267,7 +267,7 @@ def _draw_patches(path: Path) -> None:
     simulation = Simulation(load_scene(scene_file(), sets=quiet()))
     simulation.run()
     camera: Any = simulation.components["eo"]
-    with drawing(9.5, 3.6, path) as figure:
+    with draw_to_png(9.5, 3.6, path) as figure:
         for row, target in enumerate(sorted({key[0] for key in camera.patches})):
             ticks = [tick for one, tick in camera.patches if one == target]
             for column, number in enumerate(np.linspace(0, len(ticks) - 1, 6).astype(int)):

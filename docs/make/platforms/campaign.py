@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.results.statistics import rare, wilson
+from dsa_des.results.statistics import estimate_rare_mean, wilson_interval
 
 #: Events and runs by plain counting in github.com/fazlurnu/OpenCDaRR (MIT), scripts/validation, of
 #: pairs by crossing angle and of rings by number, and the errors of positions, m.
@@ -54,7 +54,9 @@ def rows(studies: Sequence[Any]) -> list[str]:
     for cell, (events, runs) in sorted(counted(studies).items()):
         lines.append(_line(cell, str(events), runs, _between(events, runs), events >= _LEAST))
     for cell, mine in _cells(studies, split=True):
-        found = rare(np.array(mine[_LOST]), np.array(mine[f"{_LOST}.unseen"]), _CONFIDENCE)
+        found = estimate_rare_mean(
+            np.array(mine[_LOST]), np.array(mine[f"{_LOST}.unseen"]), _CONFIDENCE
+        )
         many = int(mine[f"{_LOST}.runs"].sum())
         collapsed = f"split, {int(mine[f'{_LOST}.collapsed'].sum())} of {len(mine)} collapsed"
         lines.append(_line(cell, collapsed, many, (found.value, found.low, found.high), True))
@@ -74,7 +76,7 @@ def _line(
 
 
 def _between(events: int, runs: int) -> tuple[float, float, float]:
-    return events / runs, *wilson(events, runs, _CONFIDENCE)
+    return events / runs, *wilson_interval(events, runs, _CONFIDENCE)
 
 
 def _words(between: tuple[float, float, float]) -> str:

@@ -15,7 +15,7 @@ from docs.make.reference.parameter_tables import MARK, ParameterTables, mark_cha
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.message import Column, Message
 from dsa_des.block.recorded_columns import LEADING
-from dsa_des.block.registry import find
+from dsa_des.block.registry import find_component
 from dsa_des.commands.parameters import Row, scene_tables
 from dsa_des.files.output_file import write_file
 from dsa_des.running.processors import Processing
@@ -41,8 +41,8 @@ def recorded_tables() -> dict[str, dict[str, Column]]:
     """Return table → column of all that registered blocks and processors record."""
     messages: list[type[Message]] = [Processing]
     for name in entry_points_of():
-        messages += [output.message for output in find(name).outputs.values()]
-        messages += find(name).also_records
+        messages += [output.message for output in find_component(name).outputs.values()]
+        messages += find_component(name).also_records
     found: dict[str, dict[str, Column]] = {}
     for message in messages:
         for table, columns in sorted(message.recorded.items()):
@@ -68,10 +68,10 @@ def page() -> str:
     parts = [_HEAD, "## Scene files\n"]
     for name, (what, rows) in scene_tables().items():
         parts += [f"### {name}\n", f"{what}\n", _table(_KEY, map(mark_changing, rows()))]
-    tables = ParameterTables(find(name).Parameters for name in entry_points_of())
+    tables = ParameterTables(find_component(name).Parameters for name in entry_points_of())
     parts.append("## Blocks\n")
     for name in entry_points_of():
-        cls = find(name)
+        cls = find_component(name)
         doc = inspect.cleandoc(cls.__doc__ or "").split("\n\n")[0].replace("\n", " ")
         parts += [f"### {name}\n", f"{doc}\n"]
         parts += _keys(tables.rows(cls.Parameters), tables.links(cls.Parameters))

@@ -16,8 +16,8 @@ import numpy as np
 import dsa_des
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.changed_scene import Replica, scene_of
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.changed_scene import Replica, replica_scene
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 
 SCENE = "configs/tracking/passive_ranging.toml"
 STRAIGHT = "blocks.traffic.ownship.legs=[]"
@@ -103,9 +103,9 @@ def ranges(*sets: str, seeds: int = 200, scene: str = SCENE) -> Ranges:
     known = dsa_des.load_scene(
         scene, sets=[*sets, "blocks.tracker.passive_range_share=10", "record.truth=true"]
     )
-    scenes = [scene_of(known, Replica(known.seed + i, {})) for i in range(seeds)]
+    scenes = [replica_scene(known, Replica(known.seed + i, {})) for i in range(seeds)]
     sink = MemorySink()
-    lock_step(scenes, recorder=Recorder([sink])).run()
+    make_lockstep_simulation(scenes, recorder=Recorder([sink])).run()
     tables = sink.tables()
     tracks = {name: tables["state_tracks"][name].to_numpy(zero_copy_only=False)
               for name in tables["state_tracks"].column_names}  # fmt: skip

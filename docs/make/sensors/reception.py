@@ -19,7 +19,7 @@ from components.surveillance.reception import (
     fitted_reception_probability,
 )
 from dsa_des.block.mark import BLUE, ORANGE
-from dsa_des.record.drawing import drawing
+from dsa_des.record.drawing import draw_to_png
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say_lines
 
@@ -68,7 +68,7 @@ def draw(path: Path, out: Path) -> None:
     """Draw the law over all receivers' curves, for few, the default's, and many aircraft."""
     rows, parameters = receivers(path)
     shown = (AROUND[0], AROUND[2], AROUND[3])
-    with drawing(9.5, 3.4, out) as figure:
+    with draw_to_png(9.5, 3.4, out) as figure:
         for axes, around in zip(figure.subplots(1, 3, sharey=True), shown, strict=True):
             range_nmi = _X * FITTED_RANGE_M / 1852.0
             for row, curve in zip(rows, curves(parameters, *around), strict=True):

@@ -23,7 +23,7 @@ from docs.make.track_consistency.cases import OWNSHIP, Case
 from docs.make.track_consistency.nees import tracks_of
 from docs.make.track_consistency.scenes import scene_of_case
 from dsa_des.arrays.types import FloatArray
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.terminal.interruption import plain_ending
 from dsa_des.terminal.terminal import say
 
@@ -87,7 +87,7 @@ def measured(
         case, {"type": "traffic.scripted", "ownship": own, "intruders": flights()}
     )
     scene = dsa_des.load_scene({**table, "duration_s": DURATION_S})
-    scenes = [scene_of(scene, Replica(1 + i, {})) for i in range(replicas)]
+    scenes = [replica_scene(scene, Replica(1 + i, {})) for i in range(replicas)]
     targets = traffic_of(scenes[0])[0].targets
     times = np.arange(10.0, DURATION_S, max(1.0, 1.0 / rate_hz))
     square, nees = np.full((2, replicas, len(targets), len(times)), np.nan)

@@ -16,7 +16,7 @@ from docs.make.track_consistency.scenes import scenes_of
 from dsa_des.arrays.types import FloatArray
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import NotInLockStep, lock_step
+from dsa_des.replicas.lockstep import NotInLockStep, make_lockstep_simulation
 from dsa_des.running.simulation import Simulation
 
 INSTANTS_S = np.arange(12.0, 37.0, 4.0)
@@ -30,7 +30,7 @@ def tracks_of(scenes: list[Any]) -> list[Any]:
     """Return each replica's table of tracks."""
     sink = MemorySink()
     try:
-        lock_step(scenes, recorder=Recorder([sink])).run()
+        make_lockstep_simulation(scenes, recorder=Recorder([sink])).run()
     except NotInLockStep:
         tables = []
         for scene in scenes:

@@ -12,7 +12,7 @@ import dsa_des
 from components.estimation.motion import Motion
 from components.geometry import enu_to_geodetic
 from docs.make.track_consistency.cases import OWNSHIP, Case
-from dsa_des.replicas.changed_scene import Replica, scene_of
+from dsa_des.replicas.changed_scene import Replica, replica_scene
 
 _DURATION_S = 37
 _FLIGHTS = 10
@@ -72,7 +72,7 @@ def scenes_of(case: Case, replicas: int, folder: Path) -> Iterable[list[Any]]:
     if case.drawn is None:
         traffic = {"type": "traffic.scripted", "ownship": OWNSHIP, "intruders": case.targets}
         scene = dsa_des.load_scene(scene_of_case(case, traffic))
-        yield [scene_of(scene, Replica(1 + i, {})) for i in range(replicas)]
+        yield [replica_scene(scene, Replica(1 + i, {})) for i in range(replicas)]
         return
     for number in range(-(-replicas // _FLIGHTS)):
         path = folder / f"flights{number}.csv"
@@ -82,4 +82,4 @@ def scenes_of(case: Case, replicas: int, folder: Path) -> Iterable[list[Any]]:
             crafts = zip(range(1, 1 + _FLIGHTS), cycle(case.aircraft), strict=False)
             read["aircraft"] = {f"t{i}": craft for i, craft in crafts}
         scene = dsa_des.load_scene(scene_of_case(case, read))
-        yield [scene_of(scene, Replica(1 + number, {}))]
+        yield [replica_scene(scene, Replica(1 + number, {}))]

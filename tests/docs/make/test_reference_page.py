@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from docs.make.reference.__main__ import page, recorded_tables
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.recorded_columns import LEADING
-from dsa_des.block.registry import find, section_models
+from dsa_des.block.registry import find_component, section_models
 from dsa_des.cli import main
 from dsa_des.commands.parameters import parameter_rows, scene_tables
 from dsa_des.scene import scene, wiring
@@ -50,7 +50,7 @@ def test_every_key_of_every_block_follows_from_its_table_and_the_links():
         return own | inner | shared
 
     for name in entry_points_of():
-        rows = parameter_rows(find(name).Parameters)
+        rows = parameter_rows(find_component(name).Parameters)
         asked = {tuple(cell.strip().replace("|", "\\|") for cell in row) for row in rows}
         assert found(name) == asked, name
 

@@ -12,8 +12,8 @@ import dsa_des
 from components.encounters import risk_metric
 from components.encounters.risk_metric import may_climb
 from components.well_clear.missed_cylinder import Missed, probability_led_into
-from dsa_des.block.registry import find
-from dsa_des.studies.foreseen import foresee
+from dsa_des.block.registry import find_component
+from dsa_des.studies.foreseen import predict_results
 from dsa_des.studies.study_file import read_study
 from tests.encounters.scenes.test_closed_loop_risk import SCENE
 from tests.encounters.test_pairing import TURNS
@@ -38,7 +38,7 @@ def foreseen(folder: Path) -> dict[str, Any]:
     study = read_study(folder / "study.toml")
     scene = study.scene(0)
     replicas = [study.replica(number) for number in range(study.replicas)]
-    return foresee(scene, [spec.build(scene) for spec in study.metrics], replicas)
+    return predict_results(scene, [spec.build(scene) for spec in study.metrics], replicas)
 
 
 @pytest.mark.parametrize("kind", ["model", "set"])
@@ -144,7 +144,7 @@ def test_turns_lead_to_the_side_at_the_same_altitude_and_climbs_up_or_down() -> 
 def test_what_steers_says_whether_it_may_climb(
     name: str, keys: dict[str, Any], climbs: bool
 ) -> None:
-    cls = find(name)
+    cls = find_component(name)
     conf = Path(__file__).parents[3] / "configs/alerting/do365b.conf"
     parameters = cls.Parameters(**{k: conf if v == "C" else v for k, v in keys.items()})
     block: Any = SimpleNamespace(cls=cls, parameters=parameters)

@@ -16,7 +16,7 @@ from dsa_des.replicas import lock_step_size, replicas
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
-from dsa_des.studies.metric import Group, columns_wanted
+from dsa_des.studies.metric import Group, needed_columns
 
 KIND = ("encounters.closest_approach_passed",)
 MEANT_S = 40.0
@@ -195,8 +195,8 @@ def test_an_end_is_early_only_if_it_is(tmp_path):
     base = load_scene(tmp_path / "scene.toml")
     metric = ClosestApproach(ClosestApproach.Parameters(), base)
     one = [Replica(1, {})]
-    ran = replicas.run_replicas(base, one, wanted=columns_wanted([metric]))
-    told = metric.measure(Group(base, one, ran, columns_wanted([metric])))
+    ran = replicas.run_replicas(base, one, wanted=needed_columns([metric]))
+    told = metric.measure(Group(base, one, ran, needed_columns([metric])))
     assert told["closest_approach_cut_off"].tolist() == ["at the end of the run"]
 
 
@@ -216,10 +216,10 @@ def test_metrics_of_runs_that_end_differently(tmp_path, monkeypatch, rules_s):
     ]
 
     def results(some):
-        ran = replicas.run_replicas(base, some, wanted=columns_wanted(metrics))
+        ran = replicas.run_replicas(base, some, wanted=needed_columns(metrics))
         rules = [one.changes["blocks.over.after_s"] for one in some]
         assert [run.ended_early for run in ran] == [rule < MEANT_S for rule in rules]
-        group = Group(base, some, ran, columns_wanted(metrics))
+        group = Group(base, some, ran, needed_columns(metrics))
         return {k: v for metric in metrics for k, v in metric.measure(group).items()}
 
     runs = [Replica(k, {"blocks.over.after_s": rule}) for k, rule in enumerate(rules_s)]

@@ -18,7 +18,7 @@ from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas import replicas
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.scene.scene import load_scene
-from dsa_des.studies.metric import Group, columns_wanted, find_metric
+from dsa_des.studies.metric import Group, find_metric, needed_columns
 
 OWN, NEAR = "blocks.traffic.ownship.", "blocks.traffic.intruders[0]."
 ASIDE_M = 504.0
@@ -32,7 +32,7 @@ def groups(tmp_path: Any, scene: Any, changes: Any, *asked: tuple[str, dict[str,
     base = load_scene(tmp_path / "scene.toml")
     kinds = [(find_metric(name), keys) for name, keys in asked]
     metrics = [kind(kind.Parameters(**keys), base) for kind, keys in kinds]
-    wanted = columns_wanted(metrics)
+    wanted = needed_columns(metrics)
 
     def results(some: list[Replica]) -> dict[str, list[Any]]:
         group = Group(base, some, replicas.run_replicas(base, some, wanted=wanted), wanted)

@@ -11,7 +11,7 @@ from components.optical.flow import find_spot
 from components.optical.picture import background
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import lock_step
+from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 from dsa_des.time.randomness import Stream
@@ -52,7 +52,7 @@ def frames(configs, monkeypatch):
         if len(scenes) == 1:
             made = Simulation(scenes[0], recorder=recorder, window=window)
         else:
-            made = lock_step(scenes, recorder=recorder)
+            made = make_lockstep_simulation(scenes, recorder=recorder)
         made.run()
         return np.array(taken), made.components["eo"]
 

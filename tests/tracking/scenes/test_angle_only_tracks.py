@@ -10,8 +10,8 @@ import dsa_des
 from components.messages.state_tracks import COVARIANCE
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import lock_step
-from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.replicas.lockstep import make_lockstep_simulation
+from dsa_des.replicas.replicas import Replica, replica_scene
 from dsa_des.running.simulation import Simulation
 
 ERRORS = {"range_km": 20.0, "errors": "stated", "quantised": False}
@@ -124,9 +124,13 @@ def test_directions_are_from_the_ownship_of_their_own_replica():
         fusion={"type": "fusion.pass_through"}, tracker={"type": "tracking.ekf"},
     ))  # fmt: skip
     speeds = ({}, {"blocks.traffic.ownship.speed_mps": 190.0})
-    scenes = [scene_of(scene, Replica(3 + i, change)) for i, change in enumerate(speeds)]
+    scenes = [replica_scene(scene, Replica(3 + i, change)) for i, change in enumerate(speeds)]
     tables = []
-    for kind, given in ((lock_step, scenes), (Simulation, scenes[0]), (Simulation, scenes[1])):
+    for kind, given in (
+        (make_lockstep_simulation, scenes),
+        (Simulation, scenes[0]),
+        (Simulation, scenes[1]),
+    ):
         sink = MemorySink()
         kind(given, recorder=Recorder([sink])).run()
         tables.append(sink.tables()["state_tracks"])

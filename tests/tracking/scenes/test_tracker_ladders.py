@@ -9,7 +9,7 @@ from wired import chain
 import dsa_des
 from components.track_fusion.covariance_intersection import RULE
 from components.tracking.ladder import FILTER, LADDERS, LATENESS
-from dsa_des.costs.replay import errors_against, errors_against_precise, run_rung, values_of
+from dsa_des.costs.replay import errors_against, errors_against_precise, replay_values, run_rung
 
 RADAR = {
     "type": "radar.range_boundary", "scan_rate_hz": 4, "range_km": 20.0, "errors": "stated",
@@ -28,7 +28,7 @@ def scene(duration_s=4, **keys):
 def test_errors_are_distances_from_the_truth():
     loaded = dsa_des.load_scene(scene())
     run = run_rung(loaded, "tracker")
-    ticks, values = values_of(FILTER, run, run)
+    ticks, values = replay_values(FILTER, run, run)
     recorded = dsa_des.run(loaded)["state_tracks"].to_pylist()
     place = {"rolling": 0, "diving": 1}
     compared = 0
@@ -66,7 +66,7 @@ def test_late_looks_that_are_worked_on_are_rows_of_their_own():
     for mode in ("drop", "rerun"):
         late["blocks"]["tracker"]["late"] = mode
         run = run_rung(dsa_des.load_scene(late), "tracker")
-        found[mode] = values_of(LATENESS, run, run)
+        found[mode] = replay_values(LATENESS, run, run)
     rows = {mode: int((~np.isnan(v["position"])).sum()) for mode, (_, v) in found.items()}
     assert rows["rerun"] > rows["drop"] > 0
     spread = errors_against(LATENESS, found["drop"], found["rerun"])
@@ -91,7 +91,7 @@ def test_rules_of_fusion_differ_in_their_spread():
         both["blocks"]["fused"]["rule"] = rule
         loaded = dsa_des.load_scene(both)
         run = run_rung(loaded, "fused")
-        found[rule] = values_of(RULE, run, run)
+        found[rule] = replay_values(RULE, run, run)
     ticks, values = found["determinant"]
     told = [r for r in dsa_des.run(loaded)["state_tracks"].to_pylist() if r["block"] == "fused"]
     assert {r["track"] for r in told} == {1, 2}

@@ -15,8 +15,8 @@ from wired import chain, rows, run, sensor
 import dsa_des
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.replicas.lockstep import lock_step
-from dsa_des.replicas.replicas import Replica, scene_of
+from dsa_des.replicas.lockstep import make_lockstep_simulation
+from dsa_des.replicas.replicas import Replica, replica_scene
 
 DELAY_S, REACH_M = "4.0004", 2000.0
 #: Straight ahead of the ownship and coming nearer, somewhat above.
@@ -55,9 +55,9 @@ CHANGES = ({}, {"blocks.traffic.ownship.speed_mps": 210.0,
 def together():
     """Tables of both replicas, flown together."""
     loaded = dsa_des.load_scene(scene())
-    scenes = [scene_of(loaded, Replica(4 + i, change)) for i, change in enumerate(CHANGES)]
+    scenes = [replica_scene(loaded, Replica(4 + i, change)) for i, change in enumerate(CHANGES)]
     sink = MemorySink()
-    simulation = lock_step(scenes, recorder=Recorder([sink]))
+    simulation = make_lockstep_simulation(scenes, recorder=Recorder([sink]))
     simulation.run()
     assert len(simulation.runs.going) > 1
     return {name: table.to_pylist() for name, table in sink.tables().items()}
