@@ -100,13 +100,14 @@ def first_inside_cylinder(
     0.1 m at 200 m/s. Where more than 100,000 pieces along the edge would have to be cut, their
     length stands for `FINEST_S`.
     """
+    begin_s, end_s = between_s
+    starts = range(0, len(closing_mps), _PAIRS_AT_ONCE)
     firsts = [
         _first_inside_of_some(
-            apart, first,
-            *(part[first : first + _PAIRS_AT_ONCE] for part in (*between_s, closing_mps)),
+            apart, some.start, begin_s[some], end_s[some], closing_mps[some],
             horizontal_m, vertical_m,
         )
-        for first in range(0, len(closing_mps), _PAIRS_AT_ONCE)
+        for some in (slice(first, first + _PAIRS_AT_ONCE) for first in starts)
     ]  # fmt: skip
     return np.concatenate(firsts) if firsts else np.empty(0)
 
