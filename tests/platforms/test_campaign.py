@@ -15,12 +15,21 @@ def test_runs_of_a_cell_count_together_and_are_held_against_the_published_ones()
     first = pd.DataFrame(many)
     more = pd.DataFrame(many | {"well_clear_lost_mitigated": [1.0] + [0.0] * 999})
     rings = {"aircraft": 8, "error_m": 5, "well_clear_lost_mitigated": [1.0] * 50 + [0.0] * 50}
-    studies = [first, more, pd.DataFrame(rings)]
-    assert counted(studies) == {("pair, 90°", 30): (4, 2000), ("ring of 8", 5): (50, 100)}
+    fours = pd.DataFrame(rings | {"aircraft": 4, "error_m": 30})
+    sixes = {"aircraft": 6, "error_m": 30, "well_clear_lost_mitigated": [1.0] * 64 + [0.0] * 4436}
+    studies = [first, more, pd.DataFrame(rings), fours, pd.DataFrame(sixes)]
+    of_rings = {("ring of 8", 5): (50, 100), ("ring of 4", 30): (50, 100)}
+    of_rings |= {("ring of 6", 30): (64, 4500)}
+    assert counted(studies) == {("pair, 90°", 30): (4, 2000)} | of_rings
     name, split = "well_clear_lost_mitigated", {"crossing_deg": 180, "error_m": 10}
     split |= {name: [2e-5, 4e-5], f"{name}.runs": 500.0, f"{name}.unseen": 0.0}
     studies.append(pd.DataFrame(split | {f"{name}.collapsed": 0.0}))
-    pair, ring, of_repetitions = rows(studies)[2:]
+    pair, four, six, ring, of_repetitions = rows(studies)[2:]
+    assert four.endswith("| 3.97e-3 (3.32e-3 to 4.74e-3) loop | no |")
+    # It holds the loop's, whose narrow interval of 331 events does not hold it.
+    assert six.endswith(
+        "| 1.42e-2 (1.12e-2 to 1.81e-2) | 1.18e-2 (1.06e-2 to 1.32e-2) loop | yes |"
+    )
     assert of_repetitions.startswith(
         "| pair, 180° | 10 | split, 0 of 2 collapsed | 1,000 | 3.00e-5 ("
     )
