@@ -336,5 +336,5 @@ def test_only_as_a_program_the_working_directory_is_no_place_of_modules(
     monkeypatch.setattr(sys, "path", [place, "/other"])
     monkeypatch.setattr(sys, "argv", argv)
     monkeypatch.setattr(sys, "orig_argv", orig)
-    dsa_des._without_working_directory()
+    dsa_des._drop_working_directory_from_path()
     assert sys.path == (["/other"] if is_left_out else [place, "/other"])

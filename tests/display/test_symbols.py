@@ -15,10 +15,10 @@ from components.display.symbols import (
     draw_density,
     draw_lines,
     rows_by_target,
+    sensor_marks,
     spread_indices,
     stagger_marks,
-    styles_of,
-    targets_key,
+    targets_legend_entry,
 )
 from components.fusion.gated import Gated
 from components.optical.sensors import ElectroOptical, Infrared, Projection
@@ -162,7 +162,7 @@ def test_two_of_a_kind_share_the_colour_and_not_the_marker() -> None:
 
 
 def test_a_block_that_says_nothing_is_neutral_and_a_missing_one_too() -> None:
-    found = styles_of(["gone", "mine"], {"mine": object()})
+    found = sensor_marks(["gone", "mine"], {"mine": object()})
     assert list(found.values()) == list(NEUTRAL[:2])
 
 
@@ -212,7 +212,7 @@ def test_the_ownship_s_line_is_drawn_over_those_of_targets_if_there_is_one(targe
 
 
 def test_the_key_of_targets_says_what_is_dense():
-    dense, thin = targets_key(True), targets_key(False)
+    dense, thin = targets_legend_entry(True), targets_legend_entry(False)
     assert (dense.get_label(), dense.get_linewidth()) == ("targets (darker: more)", 5.0)
     assert (thin.get_label(), thin.get_linewidth()) == ("target", 1.0)
     assert dense.get_color() == thin.get_color() == TARGET

@@ -7,7 +7,7 @@ import pytest
 
 from components.aircraft.aspect_tables import read_aspect_table
 from components.optical.silhouette import visible_area
-from components.thesis.scenes import areas as areas_of
+from components.thesis.scenes import silhouette_areas as areas_of
 from components.thesis.silhouette_comparison import AXES, compare_silhouettes
 from components.thesis.silhouettes import ERRORS, MEASURED_ON, TABLES
 
