@@ -221,12 +221,19 @@ class SteeredFleet(Growing, Fleet):
         part = np.where(begun, count, 0)
         early = (~begun & (count > 0)).nonzero()[0]
         if len(early):
-            starts_s = self._start_s.take(aircraft[early], axis=0)
-            earlier = (starts_s <= time_s[early, np.newaxis]).sum(axis=1)
-            part[early] = np.minimum(earlier, count[early])
+            part[early] = self._count_begun(aircraft[early], time_s[early], count[early] - 1)
         after = part.nonzero()[0]
         own = _NOBODY if len(after) == len(part) else np.flatnonzero(part == 0)
         return own, after, self._part[aircraft[after], part[after] - 1]
+
+    def _count_begun(self, aircraft: IntArray, time_s: FloatArray, most: IntArray) -> IntArray:
+        """Return how many of the first parts of some begun by a time, by halving what it may be."""
+        least = np.zeros_like(most)
+        for _ in range(int(most.max()).bit_length()):
+            half = (least + most) // 2
+            begun = (least < most) & (self._start_s[aircraft, half] <= time_s)
+            least, most = np.where(begun, half + 1, least), np.where(begun, most, half)
+        return least
 
     @cached_property
     def max_speeds_mps(self) -> FloatArray:

@@ -131,8 +131,8 @@ class VoltagePotential(Component):
                 goal=place[:, rows].copy(),
                 last_mps=np.full((2, len(turn)), math.nan),
             )
-            unknown = np.flatnonzero(~np.isin(run, self._known.replica))
-            if len(unknown) and self.p.goal_m is not None:
+            if self.p.goal_m is not None and len(self._known.rows_of_runs(run)) < len(run):
+                unknown = np.flatnonzero(~np.isin(run, self._known.replica))
                 new.goal[:, unknown] = self._goal_positions(new.goal[:, unknown], yaw[unknown])
             known = self._known.kept_rows_or_new(new) if len(self._known) else new
             seen = Others(*(part[:, rows] for part in others))

@@ -164,10 +164,11 @@ class FlownMetric(TargetMetric):
         every = ManoeuvresTold(told_s, came_s, steered[codes], given)
         rows = np.flatnonzero(came_s < np.asarray(group.duration_s)[replica])
         rows = rows[np.lexsort((came_s[rows], replica[rows]))]
-        result = {}
+        result, every = {}, every.take(rows)
         numbers, first = np.unique(replica[rows], return_index=True)
-        for number, mine in zip(numbers.tolist(), np.split(rows, first)[1:], strict=True):
-            told = every.take(mine)
+        ends = np.searchsorted(replica[rows], numbers, side="right").tolist()
+        for number, begin, end in zip(numbers.tolist(), first.tolist(), ends, strict=True):
+            told = every.take(slice(begin, end))
             result[number] = told._replace(told_s=np.maximum.accumulate(told.told_s))
         return result
 

@@ -34,6 +34,8 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: Odds are kept within this: a track of an hour must not take an hour to be doubted.
 LARGEST_SCORE = 20.0
+# Within a thousandth of the vertical a track is started as uncertain as there.
+_STEEPEST_RAD = 0.5 * np.pi - 1e-3
 
 
 def judge_status(
@@ -157,6 +159,10 @@ def start_estimates(
     # Nearer than its own error nothing has a direction; a false alarm may be reported at range 0.
     measured[2] = np.maximum(measured[2], np.sqrt(variance[2]))
     position, jacobian = position_and_jacobian(measured, pose)
+    steep = np.abs(measured[1]) > _STEEPEST_RAD
+    if steep.any():  # straight up or down an azimuth moves nothing, and would seem to be known
+        measured[1] = np.where(steep, np.copysign(_STEEPEST_RAD, measured[1]), measured[1])
+        jacobian = position_and_jacobian(measured, pose)[1]
     spread = np.zeros((6, 6, count))
     spread[:3, :3] = multiply_by_transpose(product(jacobian, _diagonal(variance)), jacobian)
     spread[:3, :3] = 0.5 * (spread[:3, :3] + spread[:3, :3].swapaxes(0, 1))

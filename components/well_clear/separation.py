@@ -79,6 +79,7 @@ FINEST_S = 1e-3
 # Flights along the very edge would be cut up all the way: with so many pieces it ends.
 _MOST_PIECES = 100_000
 _FIRST_PIECES = 64
+# Flights along the very edge would take all of the memory.
 _PAIRS_AT_ONCE = 128
 
 
@@ -100,18 +101,27 @@ def first_inside_cylinder(
     length stands for `FINEST_S`.
     """
     begin_s, end_s = between_s
-    if len(begin_s) > _PAIRS_AT_ONCE:  # flights along the very edge would take all of the memory
-        rest = (begin_s[_PAIRS_AT_ONCE:], end_s[_PAIRS_AT_ONCE:])
-        return np.concatenate([
-            first_inside_cylinder(
-                apart, (begin_s[:_PAIRS_AT_ONCE], end_s[:_PAIRS_AT_ONCE]),
-                closing_mps[:_PAIRS_AT_ONCE], horizontal_m, vertical_m,
-            ),
-            first_inside_cylinder(
-                lambda pair, time_s: apart(pair + _PAIRS_AT_ONCE, time_s), rest,
-                closing_mps[_PAIRS_AT_ONCE:], horizontal_m, vertical_m,
-            ),
-        ])  # fmt: skip
+    starts = range(0, len(closing_mps), _PAIRS_AT_ONCE)
+    firsts = [
+        _first_inside_of_some(
+            apart, some.start, begin_s[some], end_s[some], closing_mps[some],
+            horizontal_m, vertical_m,
+        )
+        for some in (slice(first, first + _PAIRS_AT_ONCE) for first in starts)
+    ]  # fmt: skip
+    return np.concatenate(firsts) if firsts else np.empty(0)
+
+
+def _first_inside_of_some(
+    apart: Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]],
+    first: int,
+    begin_s: FloatArray,
+    end_s: FloatArray,
+    closing_mps: FloatArray,
+    horizontal_m: float,
+    vertical_m: float,
+) -> FloatArray:
+    """Return `first_inside_cylinder` of the pairs from the number `first` on."""
     earliest = np.full(len(begin_s), np.inf)
     length = (end_s - begin_s) / _FIRST_PIECES
     looked_at = np.flatnonzero(end_s >= begin_s)
@@ -120,7 +130,7 @@ def first_inside_cylinder(
     start: FloatArray = begin_s[pair] + length[pair] * number
     while len(start):
         half = 0.5 * length
-        across_m, high_m = apart(pair, start + half[pair])
+        across_m, high_m = apart(first + pair, start + half[pair])
         drift_m = (closing_mps * half)[pair]
         maybe, within = _masks_possibly_and_surely_inside(
             across_m, high_m, drift_m, horizontal_m, vertical_m

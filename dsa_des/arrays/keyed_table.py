@@ -115,6 +115,8 @@ def indices_by_occurrence(keys: IntArray) -> list[IntArray]:
     """Return index arrays of each key's first occurrence, then of its second, and so on."""
     if len(keys) == 0 or bool((keys == keys[0]).all()):
         return list(np.arange(len(keys))[:, np.newaxis])
+    if bool((keys[1:] > keys[:-1]).all()):  # the usual case: a row of each run
+        return [np.arange(len(keys))]
     order = np.argsort(keys, kind="stable")
     begins = np.append(True, keys[order][1:] != keys[order][:-1])
     turn = np.empty(len(keys), dtype=np.int64)

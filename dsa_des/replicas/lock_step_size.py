@@ -33,13 +33,19 @@ class RunSize:
     def estimate(cls, scene: Scene, wanted: Mapping[str, Collection[str]]) -> "RunSize":
         """Return the estimated size of the scene's run, recording the `wanted` columns.
 
-        Of these there is hardly more than a row of every target at every scan. What is wrong with
-        the scene is raised.
+        Of these there is hardly more than a row of every target at every scan, or one of them all
+        where a table has no targets. What is wrong with the scene is raised.
         """
         simulation = Simulation(scene)
-        targets = max(1, *(component.width for component in simulation.components.values()))
+        components = simulation.components.values()
+        targets = max(1, *(component.width for component in components))
         held = _estimate_held_bytes(float(simulation.duration_s), simulation.scans, 1 + targets)
-        return cls(held, 8.0 * sum(map(len, wanted.values())) * simulation.scans * targets)
+        sent = [output.message for of in components for output in of.outputs.values()]
+        of_no_target = {message.row_table for message in sent}
+        columns = sum(
+            len(some) * (1 if table in of_no_target else targets) for table, some in wanted.items()
+        )
+        return cls(held, 8.0 * columns * simulation.scans)
 
     @property
     def largest_run_count(self) -> int:

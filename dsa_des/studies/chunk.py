@@ -46,7 +46,8 @@ from dsa_des.studies.metric import Group, Metric, measure_one_by_one, missing_va
 from dsa_des.studies.splitting import Nearness, SplitEvent, run_split
 from dsa_des.studies.study import Chunk, Study, format_set_value
 
-#: After so many runs at once a worker looks for garbage, or the next ones stand beside it.
+#: After so many runs at once a worker looks for garbage, or the next ones stand beside it: blocks
+#: know each other in circles, 80 MB of 500 runs.
 _MANY_RUNS = 64
 # New objects after which Python looks for garbage: the usual 700 take 4 % of a lock step.
 _OBJECTS_AT_ONCE = 50_000
@@ -126,7 +127,7 @@ def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[ChunkResult]:
         for chunk, parts, said in zip(chunks, tables, failure_counts, strict=True)
     ]
     runs = sum(map(len, chunks))
-    if runs >= _MANY_RUNS:  # blocks know each other in circles: 80 MB of 500 runs
+    if runs >= _MANY_RUNS:
         gc.collect()
     each_s = (time.process_time() - began_s) / runs
     return [replace(one, cpu_s=each_s * one.runs) for one in done]
@@ -243,6 +244,8 @@ def _run_cell(
                 np.append(of, len(failure_counts)),
                 [*failure_counts, []],
             )  # that of the pilot is lost
+            if len(runs) >= _MANY_RUNS:  # those of the stage before
+                gc.collect()
             return _run_and_measure_replicas(
                 scene, [nearness], runs, wrong, key, chunk_of[number], said
             ), wrong
@@ -305,6 +308,8 @@ def _run_and_measure_replicas(
         left = len(replicas) - done
         many = math.ceil(left / math.ceil(left / most))
         part = replicas[done : done + many]
+        if done and many >= _MANY_RUNS:
+            gc.collect()
         outcomes = _run_or_fail(scene, part, wanted)
         for chunk in np.unique(of[done : done + many]).tolist():
             mine = np.flatnonzero(of[done : done + many] == chunk)
@@ -324,6 +329,7 @@ def _run_and_measure_replicas(
         for k, text in wrong.items():
             errors[done + good[k]] = text
         done += len(part)
+        del outcomes, recorded
     return values
 
 

@@ -130,9 +130,11 @@ def test_a_lock_step_of_many_aircraft_holds_as_many_fewer_runs() -> None:
     wide = RunSize.estimate(crowd, {"tracks": ("tick", "range_m")})
     scans = wide.recorded / (8 * 2 * 8)
     assert scans == int(scans) > 60
-    assert wide.largest_run_count == nine.largest_run_count and replace(
-        wide, recorded=1e6
-    ).largest_run_count == int(360e6 / 2.4e6)
+    told = RunSize.estimate(crowd, {"manoeuvres": ("tick", "turn_rad")})
+    assert told.recorded == wide.recorded / 8  # a row for all of them
+    limited = replace(wide, recorded=1e6)
+    assert wide.largest_run_count == nine.largest_run_count
+    assert limited.largest_run_count == int(360e6 / 2.4e6)
     assert surely_fit_in_memory(crowd, 64) and not surely_fit_in_memory(crowd, 65)
 
 

@@ -1,5 +1,6 @@
 """A chunk whose rows do not fit in memory at once is run in parts, with the same bytes."""
 
+import weakref
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -7,7 +8,8 @@ from typing import Any
 import pytest
 
 from dsa_des.replicas import lock_step_size
-from dsa_des.replicas.replicas import run_replicas
+from dsa_des.replicas import replicas as in_lock_step
+from dsa_des.replicas.replicas import make_lockstep_simulation, run_replicas
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies import chunk as chunks
 from dsa_des.studies.chunk import run_chunk
@@ -25,10 +27,16 @@ def test_parts_of_a_chunk_give_its_bytes(small: Path, monkeypatch: pytest.Monkey
     }
     study = study_of_tables(tables, read_scene_file("small.toml"), (), ())
     recorded, measured = list[int](), list[int]()
+    simulations, still_there = list[Any](), list[int]()
 
     def run(scene: Any, replicas: Any, **how: Any) -> Any:
         recorded.append(len(replicas))
+        still_there.append(sum(one() is not None for one in simulations))
         return run_replicas(scene, replicas, **how)
+
+    def noted(*given: Any, **how: Any) -> Any:
+        simulations.append(weakref.ref(one := make_lockstep_simulation(*given, **how)))
+        return one
 
     def made(*given: Any) -> Group:
         group = Group(*given)
@@ -52,6 +60,8 @@ def test_parts_of_a_chunk_give_its_bytes(small: Path, monkeypatch: pytest.Monkey
     whole = run_chunk(study, Chunk("part", ((0, 0, 16),)))
     assert recorded == [16] and 0 < whole.failed < 16
     monkeypatch.setattr(lock_step_size, "MOST_BYTES", 300e3)
+    monkeypatch.setattr(chunks, "_MANY_RUNS", 2)
+    monkeypatch.setattr(in_lock_step, "make_lockstep_simulation", noted)
     chunks._size_of_a_run.clear()
     del recorded[:]
     parts = run_chunk(study, Chunk("part", ((0, 0, 16),)))
@@ -59,6 +69,8 @@ def test_parts_of_a_chunk_give_its_bytes(small: Path, monkeypatch: pytest.Monkey
     # By the scans and targets of the scene fewer than all at once, and more than few.
     assert 1 < recorded[0] < 16 and max(recorded[1:]) < 16 and sum(recorded) == 16
     assert max(measured[-len(recorded) :]) < 16
+    # Nothing of the part before stands beside the next.
+    assert len(simulations) > 1 and set(still_there) == {0}
     # What was learnt holds for the next chunk of the cell.
     del recorded[:]
     run_chunk(study, Chunk("next", ((0, 0, 16),)))

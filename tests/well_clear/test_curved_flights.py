@@ -71,6 +71,15 @@ def test_begins_of_many_pairs_are_within_the_bound():
     assert np.nanmax(np.abs(first - wanted)) <= FINEST_S
     (alone, speed) = each[139]
     assert first[139] == first_of(alone, begin_s[139], end_s[139], speed)
+    # As many as metrics have of two thousand rings of nine; only the last two have any time.
+    begin_s = np.append(np.ones(71_999), begin_s[138:])
+    end_s = np.append(np.zeros(71_999), end_s[138:])
+    many = first_inside_cylinder(
+        lambda pair, time_s: apart(pair - 71_861, time_s), (begin_s, end_s),
+        np.full(len(begin_s), fastest.max()), D_M, Z_M,
+    )  # fmt: skip
+    assert np.isnan(many[:71_999]).all()
+    np.testing.assert_allclose(many[71_999:], wanted[138:], rtol=0, atol=FINEST_S)
 
 
 def test_a_pass_between_two_samples_is_found():

@@ -138,3 +138,16 @@ def test_directions_are_from_the_ownship_of_their_own_replica():
         assert alone.num_rows > 10
         mine = tables[0].filter(np.equal(tables[0]["replica"].to_numpy(), number))
         assert mine.drop_columns(["replica"]).combine_chunks().equals(alone.combine_chunks())
+
+
+def test_what_is_straight_below_has_a_direction_though_its_azimuth_moves_nothing():
+    """Taken for known, it left a covariance without a root, and nothing could be tracked."""
+    level = {"lat_deg": 47, "lon_deg": 8, "alt_m": 1000, "heading_deg": 40, "speed_mps": 50}
+    scene = chain(
+        {"eye": {**EYE, "elevation_deg": [-90, 90], "quantised": True}}, ownship=level,
+        targets=[{"name": "below", **level, "alt_m": 400}], duration_s=2,
+        fusion={"type": "fusion.pass_through"}, tracker={"type": "tracking.ukf"},
+    )  # fmt: skip
+    told = [row for row in rows(run(scene), "state_tracks") if row["track"] == 1]
+    assert len(told) == 10 and np.isfinite([row["azimuth_variance_rad2"] for row in told]).all()
+    assert np.pi / 2 + told[0]["elevation_rad"] < np.radians(0.2)
