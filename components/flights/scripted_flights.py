@@ -232,7 +232,7 @@ class ScriptedFleet(Growing, Fleet):
 
     def _clear_cached(self) -> None:
         """Discard the cached properties, because the flights have changed."""
-        for name in ("_parts", "max_speeds_mps"):
+        for name in ("_groups_and_others", "max_speeds_mps"):
             self.__dict__.pop(name, None)
 
     def _leg_tables(self, kind: int, slot: IntArray) -> FloatArray:

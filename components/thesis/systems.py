@@ -345,7 +345,7 @@ def _declaration_rows(printed: Cells, done: SceneRun) -> list[Row]:
                       "systems/afrl.toml:blocks.centre.false_alarms_per_frame")))  # fmt: skip
     for cell, distance_nm in (("pd_near", 2.0), ("pd_far", 3.5)):
         pixels = BONANZA_M2 / (pixel_sr * (1000.0 * distance_nm * NAUTICAL_MILE_KM) ** 2)
-        signature = camera.p.static_weight * pixels * camera.share(pixels)
+        signature = camera.p.static_weight * pixels * camera.counted_signature_share(pixels)
         pd = detection_probability(signature, result.threshold, result.noise)
         rows.append(printed[cell].compare(
             f"AFRL, Pd of a Bonanza at {distance_nm:g} NM, high threshold", 100.0 * float(pd), "%",

@@ -88,7 +88,9 @@ class Assembly:
         if block.parameters is not old.parameters and block.parameters != old.parameters:
             heeds = block.cls.remembers is not None or block.cls.heeds_changes
             if block.cls is not old.cls or not heeds:
-                message = f"cannot change while a run lasts: {block.cls.path()} is made anew by it"
+                message = (
+                    f"cannot change while a run lasts: {block.cls.import_path()} is made anew by it"
+                )
                 raise SceneError([self._scene.problem(f"blocks.{name}", message)])
             return True
         return block.cls.remembers is not None and scene.sections != before.sections

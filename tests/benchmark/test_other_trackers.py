@@ -25,7 +25,7 @@ def test_the_plain_loop_comes_to_the_states_of_our_tracker():
     states, covariances = track_plainly(
         looks[1:], *first, block.p.acceleration_intensity_m2_s3, looks[0].time_s
     )
-    ours, spreads = block._store.states()[0], block._store.covariances()[0]
+    ours, spreads = block._store.states_by_model()[0], block._store.covariances_by_model()[0]
     assert ours.shape == (6, 4) and len(COVARIANCE) == 21
     for k in range(4):
         j = int(np.argmin([np.abs(s[:3] - ours[:3, k]).max() for s in states]))

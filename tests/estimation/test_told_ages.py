@@ -119,8 +119,8 @@ def nees_of(estimator, intensity, flown, seed=5):
 def begun(said, told, age, model, place):
     state, covariance = np.zeros((12, COUNT)), np.zeros((12, 12, COUNT))
     state[:6] = said
-    effects = told.effects(said, place)
-    new = age.errors(model, state, np.ones((3, COUNT)))[0]
+    effects = told.effects_on_reported_states(said, place)
+    new = age.error_covariances(model, state, np.ones((3, COUNT)))[0]
     for i in range(6):
         new[i, i] += WHITE_M2
         covariance[6 + i, 6 + i] = 1.0

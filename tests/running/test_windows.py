@@ -144,7 +144,7 @@ class WilfulWindows:
         self.inner.limit(longest_ticks)
 
     def next(self):
-        self.inner.limit(self.dice.randrange(10**9, 20 * 10**9))
+        self.inner.limit_length(self.dice.randrange(10**9, 20 * 10**9))
         return self.inner.next()
 
     def commit(self, window, failure):

@@ -62,14 +62,14 @@ def head_lines(costs: Sequence[Any], cut_off: str) -> str:
         ratio = us(block, one) / us(block, other)
         return "as much" if 1 / 1.1 < ratio < 1.1 else f"{ratio:.2g} times as much"
 
-    flat = of["transform", "flat_earth"].error.maximum
+    flat = of["transform", "flat_earth"].first_quantity_error.maximum
     instant, window = of["fusion", "exact_instant"], of["fusion", "window"]
     return _HEAD.format(
         flat_saves=saved("transform", "flat_earth", "ellipsoid"),
         flat_max=f"{flat:.1f}",
         flat_pixels=f"{flat / math.radians(PIXEL_DEG) / 1e3:.1f}",
         attitude_saves=saved("transform", "small_angle", "exact"),
-        small_angle=f"{of['transform', 'small_angle'].error.maximum:.0f}",
+        small_angle=f"{of['transform', 'small_angle'].first_quantity_error.maximum:.0f}",
         table_times=times("radar", "table", "exact"),
         gram_times=times("radar", "gram_charlier", "exact"),
         boundary_saves=saved("radar", "range_boundary", "exact"),
@@ -85,7 +85,7 @@ def head_lines(costs: Sequence[Any], cut_off: str) -> str:
         window_extra=saved("fusion", "exact_instant", "window"),
         share=f"{window.effect['fused_share'] - window.effect['fused_share_change']:.0%}",
         window_share=f"{window.effect['fused_share']:.0%}",
-        window_range=f"{window.error.p95 - instant.error.p95:.1f}",
+        window_range=f"{window.first_quantity_error.p95 - instant.first_quantity_error.p95:.1f}",
     )
 
 
@@ -351,7 +351,7 @@ def _tables(costs: Sequence[Any]) -> str:
     for _, group in groupby(costs, key=lambda cost: (cost.block, cost.ladder.name)):
         rungs = list(group)
         quantity = rungs[0].ladder.quantities[0]
-        if all(cost.unavailable or cost.error.count == 0 for cost in rungs):
+        if all(cost.unavailable or cost.first_quantity_error.count == 0 for cost in rungs):
             lines += [f"**{rungs[0].block}, {rungs[0].ladder.name}**: no target was in view.", ""]
             continue
         lines += [
@@ -378,7 +378,7 @@ def _tables(costs: Sequence[Any]) -> str:
 
 def _line(cost: Any) -> str:
     name = f"**{cost.rung}**" if cost.pareto else cost.rung
-    error = cost.error
+    error = cost.first_quantity_error
     cells = [
         name + (" (scene)" if cost.in_scene else ""),
         f"{cost.cpu_us_per_target_scan:.3g} ± {float(f'{cost.cpu_spread_us:.1g}'):g}",

@@ -146,7 +146,8 @@ def test_looks_have_in_common_what_lies_between_them_whichever_was_first():
     """2 s apart, 0.02 rad across the line on which azimuths jump, in either order: 3 s is other."""
     told = []
     lasting = SimpleNamespace(
-        is_correlated=np.array([True]), common=lambda *given: told.append(given)
+        is_correlated=np.array([True]),
+        covariance_with_last_errors=lambda *given: told.append(given),
     )
     rules = SimpleNamespace(lasting=lasting, ticks_per_s=10)
     part = SimpleNamespace(

@@ -65,7 +65,7 @@ class Clocks:
         In order of time and priority.
         """
         if self._activate is None:
-            self._activate = self._of.function("fmi3ActivateModelPartition")
+            self._activate = self._of.library_function("fmi3ActivateModelPartition")
             self._activate.argtypes = [c.c_void_p, c.c_uint32, c.c_double]
         waiting = [(tick, self._clocks[number]["priority"], number) for number in due]
         while True:
@@ -82,7 +82,7 @@ class Clocks:
             reference = self._clocks[number]["reference"]
             status = self._activate(self._of.component, reference, at / per_s)
             if status > 1:
-                self._of.refuse("fmi3ActivateModelPartition", status)
+                self._of.raise_failure("fmi3ActivateModelPartition", status)
             for place, output in enumerate(self._outputs):
                 raised[place] += self._of.fmu.getClock([output])[0]
             self.update_pending_ticks(at, per_s)

@@ -49,7 +49,7 @@ class ValueGroup:
         references = [reference for reference, _ in variables]
         self.count = sum(size for _, size in variables)
         self.references: Any = (c.c_uint32 * len(references))(*references)
-        self._function = fmu.function(self.call)
+        self._function = fmu.library_function(self.call)
         if kind == "Binary":
             self.sizes = (c.c_size_t * self.count)()
             self.buffer: Any = (c.POINTER(c.c_uint8) * self.count)()
@@ -66,7 +66,7 @@ class ValueGroup:
         """Call the FMU's Get or Set, which fills the buffer or takes the values from it."""
         status = self._function(*self._arguments)
         if status > 1:
-            self.fmu.refuse(self.call, status)
+            self.fmu.raise_failure(self.call, status)
 
     def set_values(self, values: Any) -> None:
         """Set the variables to the given texts or numbers at once."""
