@@ -144,15 +144,23 @@ def estimate_rare_probability(values: FloatArray, more: FloatArray, confidence: 
     """Return the mean of independent estimates of one rare probability; NaN ones are left out.
 
     Such estimates are products, and skewed: the interval is that of Student's t for the logarithm
-    of the mean. Where all are 0 it ends where Poisson's law lets nothing be seen as often as an end
-    may err; `more` is what one event more would have added to each.
+    of the mean, and they are few where that is no surer than so many events counted. Where all are
+    0 it ends where Poisson's law lets nothing be seen as often as an end may err; `more` is what
+    one event more would have added to each.
     """
     plain = estimate_mean(values, confidence)
     if plain.count < 2:
         return plain
     if plain.value > 0.0:
-        factor = math.exp(min(plain.half_width / plain.value, _MOST_LOG))
-        return replace(plain, low=plain.value / factor, high=min(1.0, plain.value * factor))
+        relative = plain.half_width / plain.value
+        factor = math.exp(min(relative, _MOST_LOG))
+        few = (
+            plain.few
+            or FEW * (relative / two_sided_t_quantile(plain.count - 1, confidence)) ** 2 > 1.0
+        )
+        return replace(
+            plain, low=plain.value / factor, high=min(1.0, plain.value * factor), few=few
+        )
     expected = -math.log((1.0 - confidence) / 2.0)
     known = more[~np.isnan(more)]
     return replace(plain, high=min(1.0, expected * float(known.mean()) / len(known)))

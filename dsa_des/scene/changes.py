@@ -204,7 +204,8 @@ def _explain_unchangeable_key(scene_file: SceneFile, key: Key, blocks: Mapping[s
             allowed, rest = allowed + of_tables, list(inside)
         elif inside[0] in of_tables:
             return (
-                f"cannot change while a run lasts: {cls.import_path()} does not say what it remembers "
+                f"cannot change while a run lasts: {cls.import_path()} does not say what it "
+                f"remembers "
                 "(Component.remembers)"
             )
         what = f"blocks.{name}, a {cls.__name__},"

@@ -125,7 +125,8 @@ def read_clocks(scene: SceneFile, blocks: "Mapping[str, Block]") -> dict[str, Cl
         if spec is None or isinstance(spec, ClockSpec):
             clocks[name] = spec
         else:
-            message = f"{block.cls.import_path()} gives no clock: clock_of must return a ClockSpec or None"
+            of = block.cls.import_path()
+            message = f"{of} gives no clock: clock_of must return a ClockSpec or None"
             scene.report(("blocks", name), message)
     return clocks
 

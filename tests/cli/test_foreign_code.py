@@ -189,7 +189,8 @@ def test_the_working_directory_is_on_the_path_only_meanwhile(tmp_path: Path) -> 
         "from components.gate import Gate\n"
     )
     script = (
-        "import os, sys; from dsa_des.block.registry import find_component; before = list(sys.path)\n"
+        "import os, sys; from dsa_des.block.registry import find_component; before = "
+        "list(sys.path)\n"
         "find_component('mine:Gate'); assert sys.path == before and os.getcwd() not in before"
     )
     done = subprocess.run(

@@ -116,6 +116,10 @@ def test_the_mean_of_rare_probabilities_by_hand() -> None:
     assert (found.value, found.count) == (pytest.approx(2e-4), 2)
     assert found.low == pytest.approx(2e-4 / factor, rel=1e-4)
     assert found.high == pytest.approx(2e-4 * factor, rel=1e-4)
+    # Ten of 1 ± s are as sure as ten events where s is 1, for s / sqrt(10) = 1 / sqrt(10).
+    for size, few in ((0.94, False), (0.96, True)):
+        ten = estimate_rare_probability(1.0 + size * np.tile([-1.0, 1.0], 5), np.ones(10), 0.95)
+        assert ten.few == few
     alone = estimate_rare_probability(np.array([1e-4, nan]), np.full(2, 1e-3), 0.95)
     assert alone.value == 1e-4 and np.isnan([alone.low, alone.high]).all()
     # None was seen in two: 3.689 events are as rare as an end may err; each adds 0.002 to one.
