@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.display.picture import offset_positions
+from components.display.picture_plane import offset_positions
 from components.estimation.frame import vectors_in_frame
 from components.geometry import body_to_ned, north_east_up, unit_vector_unchecked
 from components.messages.alerts import TRACKS_FROM

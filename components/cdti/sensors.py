@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from components.messages.detections import Detections, SensorOffer
-from components.sensor.marks import IR
+from components.sensor.palette import IR
 from dsa_des.block.component import Component
 from dsa_des.running.simulation import Simulation
 from dsa_des.text.safe_text import printable

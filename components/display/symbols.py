@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.sensor.marks import COOPERATIVE, EO, FUSION, IR, LASER, RADAR, TRACKER
+from components.sensor.palette import COOPERATIVE, EO, FUSION, IR, LASER, RADAR, TRACKER
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.mark import Mark, distinguish_marks, marks_of
 from dsa_des.record.drawing import figure_text

@@ -34,7 +34,7 @@ from components.display.symbols import (
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, draw_to_png, figure_text
-from dsa_des.replicas.times_out import outage_times_of_seeds
+from dsa_des.replicas.outage_times import outage_times_of_seeds
 from dsa_des.running.simulation import Simulation
 
 Scans = dict[str, SensorScans]

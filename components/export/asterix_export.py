@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from components.display.picture import (
+from components.display.picture_plane import (
     LINE,
     bearings_and_end_points,
     estimated_positions,

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from components.display.picture import (
+from components.display.picture_plane import (
     LINE,
     bearings_and_end_points,
     estimated_positions,

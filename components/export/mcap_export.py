@@ -23,7 +23,7 @@ from components.export.globe_run import (
 )
 from components.geometry import line_of_sight_ned
 from dsa_des.arrays.types import FloatArray
-from dsa_des.errors.extras import import_extra
+from dsa_des.errors.optional_libraries import import_extra
 
 _NANO = 10**9
 #: The frame of all that is drawn: east, north and up of where the first aircraft begins.

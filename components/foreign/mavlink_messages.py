@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from components.formats.asterix_records import callsign
-from dsa_des.errors.extras import import_extra
+from dsa_des.errors.optional_libraries import import_extra
 
 _E7, _MILLI, _CENTI = 1e7, 1e3, 1e2
 _DIALECT = "pymavlink.dialects.v20.common"

@@ -10,7 +10,7 @@ import socket
 import sys
 from typing import Any
 
-from dsa_des.errors.extras import import_extra
+from dsa_des.errors.optional_libraries import import_extra
 
 _NEAR_M, _LEVEL_M, _AHEAD_S, _TURN_RAD, _PAUSE_S = 600.0, 150.0, 60.0, math.radians(45.0), 120.0
 _M_PER_E7 = 111_200.0 / 1e7

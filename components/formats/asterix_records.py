@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.formats.text_rows import TrafficFileError
 from dsa_des.errors import UsageError
-from dsa_des.errors.extras import import_extra
+from dsa_des.errors.optional_libraries import import_extra
 
 DAY_S = 86400.0
 #: Reports of a radar's own service, plots, system tracks, and ADS-B reports.

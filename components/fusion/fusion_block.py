@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from components.fusion.recent import Recent, split_used_rows
+from components.fusion.recent_detections import Recent, split_used_rows
 from components.messages.columns import OWN_VELOCITY, POSE, TOLD
 from components.messages.contributors import mask_type
 from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.navigation.errors import has_navigation_errors
-from components.sensor.marks import FUSION
+from components.sensor.palette import FUSION
 from dsa_des.arrays.run_ticks import RunTicks, rank_instants, take_runs
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Producer

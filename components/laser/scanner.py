@@ -29,7 +29,7 @@ from components.radar.measurement import range_variance
 from components.sensor.cued_looks import refuse_if_cued
 from components.sensor.ladder_values import make_cell_measure
 from components.sensor.look import Cells, Look, effect_values_of_cells
-from components.sensor.marks import LASER
+from components.sensor.palette import LASER
 from components.sensor.parameters import RangeErrorParameters, SensorParameters
 from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import AnyArray, FloatArray

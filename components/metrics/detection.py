@@ -26,7 +26,7 @@ from components.metrics.rows import (
     share_columns,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.replicas.times_out import blocks_with_outages, outage_times_of_replicas
+from dsa_des.replicas.outage_times import blocks_with_outages, outage_times_of_replicas
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import (
     EVENT,

@@ -32,7 +32,7 @@ from components.metrics.rows import (
 from components.metrics.separation import RelativeFlight, traffic_block
 from components.well_clear.volume import PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
-from dsa_des.replicas.times_out import (
+from dsa_des.replicas.outage_times import (
     blocks_with_outages,
     outage_times_of_replicas,
     was_out_between,

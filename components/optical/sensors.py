@@ -16,7 +16,7 @@ from components.optical.weather_effects import BandExtinction, Night
 from components.sensor.cued_looks import refuse_if_cued
 from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look, aspect_angles_of_cells
-from components.sensor.marks import EO, IR
+from components.sensor.palette import EO, IR
 from components.sensor.parameters import CorrelationTime, ErrorParameters, SensorParameters
 from components.sensor.sensor import CUED_INPUTS, Sensor
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray

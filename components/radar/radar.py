@@ -48,7 +48,7 @@ from components.radar.weather import (
 from components.sensor.acquisition import STEP_S, Acquired, AcquisitionRange, check_speeds_ascend
 from components.sensor.cued_looks import refuse_if_cued
 from components.sensor.look import Cells, CellValues, Look, effect_values_of_cells
-from components.sensor.marks import RADAR
+from components.sensor.palette import RADAR
 from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict

@@ -13,7 +13,7 @@ from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.detections import SensorOffer, offers_of_fused_sensors
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import COVARIANCE, DELETED, StateTracks
-from components.sensor.marks import TRACKER
+from components.sensor.palette import TRACKER
 from components.stone_soup.library import Repeatable, require_stone_soup
 from components.stone_soup.reported_tracks import Followed, Follower
 from components.tracking.due_detections import ACTS_EVERY_S, Promises
@@ -22,9 +22,9 @@ from components.tracking.reported_errors import folded_range_warnings, latency_w
 from components.tracking.scans import Scans, looks_of_message, split_due_looks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
-from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
 from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
 from dsa_des.block.message import offsets_from_entry_rows
+from dsa_des.block.shadowed_packages import NotAllowed, NotImportable, load_named
 from dsa_des.block.source_file import absolute_type_name
 from dsa_des.block.wake import Wake
 from dsa_des.time.randomness import key_of

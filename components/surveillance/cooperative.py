@@ -14,7 +14,7 @@ from components.atmosphere.pressure_altitude import Air, scene_air
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.reach import Reach
 from components.sensor.look import Cells
-from components.sensor.marks import COOPERATIVE
+from components.sensor.palette import COOPERATIVE
 from components.sensor.parameters import SensorParameters
 from components.sensor.sensor import Sensor
 from components.surveillance.reports import CooperativeReports

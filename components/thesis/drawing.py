@@ -10,7 +10,7 @@ import numpy as np
 
 from components.display.map_view import outline_of
 from components.display.symbols import add_grid, sensor_marks
-from components.sensor import marks
+from components.sensor import palette
 from components.thesis.scenes import SceneRun
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.record.drawing import draw_to_png
@@ -19,7 +19,9 @@ from dsa_des.record.drawing import draw_to_png
 WIDTH_IN, HEIGHT_IN = 6.6, 3.9
 
 #: By kind, as in every other figure.
-RADAR, EO, IR, FUSION = (mark.colour for mark in (marks.RADAR, marks.EO, marks.IR, marks.FUSION))
+RADAR, EO, IR, FUSION = (
+    mark.colour for mark in (palette.RADAR, palette.EO, palette.IR, palette.FUSION)
+)
 #: For whatever is no kind of sensor, beside those of `dsa_des.record.drawing`.
 GREY = "#777777"
 

@@ -11,7 +11,7 @@ from components.estimation.motion import ConstantVelocity
 from components.messages.columns import ORIGIN, POSITION
 from components.messages.detections import SensorOffer, offers_of_fused_sensors
 from components.messages.state_tracks import DELETED, StateTracks
-from components.sensor.marks import FUSION
+from components.sensor.palette import FUSION
 from components.track_fusion.fused_tracks import (
     empty_fused_tracks,
     fuse_states,

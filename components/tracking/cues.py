@@ -12,7 +12,7 @@ from components.estimation.measurement import cone_half_angle_rad
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.cues import CueCones
 from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks, covariance_matrices
-from components.sensor.marks import TRACKER
+from components.sensor.palette import TRACKER
 from dsa_des.arrays.keyed_table import indices_by_occurrence
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters

@@ -12,7 +12,7 @@ from components.messages.false_detections import without_false_alarms
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.messages.tracks import Tracks, TracksWithPose
 from components.navigation.errors import has_navigation_errors
-from components.sensor.marks import TRACKER
+from components.sensor.palette import TRACKER
 from components.tracking.reported_errors import folded_range_warnings, latency_warnings
 from dsa_des.arrays.entries import rows_and_columns_of_true
 from dsa_des.arrays.keyed_table import KeyedTable

@@ -13,7 +13,7 @@ from components.estimation.motion import ConstantVelocity
 from components.messages.detections import SensorOffer, offers_of_fused_sensors
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import CONFIRMED, DELETED, StateTracks
-from components.sensor.marks import TRACKER
+from components.sensor.palette import TRACKER
 from components.tracking.association import ASSOCIATIONS, Association
 from components.tracking.due_detections import ACTS_EVERY_S, Silence
 from components.tracking.ladder import LADDERS

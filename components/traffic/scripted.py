@@ -17,9 +17,9 @@ from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajector
 from components.geometry import enu_to_geodetic
 from components.traffic.flown_flights import FlightsOfRuns
 from components.traffic.heights import Heights
+from components.traffic.overhead_wires import NO_AREAS, OverheadWire
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
-from components.traffic.wires import NO_AREAS, OverheadWire
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters
 

@@ -8,7 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from components.display.picture import LINE, TangentPlane, bearings_and_end_points, offset_positions
+from components.display.picture_plane import (
+    LINE,
+    TangentPlane,
+    bearings_and_end_points,
+    offset_positions,
+)
 from components.display.recorded_run import POSE, RecordedTables, read_table
 from components.display.symbols import block_marks, platform_colours, recolour_by_platform
 from components.formats.daa_file import read_daa_samples

@@ -25,7 +25,7 @@ from components.optical.weather_effects import (
 )
 from components.sensor.ladder_values import make_cell_measure
 from components.sensor.look import Cells, Look, effect_values_of_cells
-from components.sensor.marks import EYES
+from components.sensor.palette import EYES
 from components.sensor.parameters import (
     CorrelationTime,
     ErrorParameters,

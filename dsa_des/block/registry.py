@@ -9,7 +9,9 @@ from typing import Any
 
 from dsa_des.block.component import Component, Input, Output, Parameters, SourcedText
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import (
+from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
+from dsa_des.block.message import Message
+from dsa_des.block.shadowed_packages import (
     NotAllowed,
     NotImportable,
     is_ours,
@@ -17,8 +19,6 @@ from dsa_des.block.foreign import (
     load_named,
     load_unnamed_entry_point,
 )
-from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
-from dsa_des.block.message import Message
 from dsa_des.errors import did_you_mean
 
 SECTIONS = "dsa_des.sections"
@@ -102,7 +102,7 @@ class UnknownType(Exception):
 class NotImported(UnknownType):
     """A block type is foreign, and nothing foreign may be imported.
 
-    See `dsa_des.block.foreign.Imports`.
+    See `dsa_des.block.shadowed_packages.Imports`.
     """
 
 

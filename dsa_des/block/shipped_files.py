@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import load_unnamed_entry_point
 from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
+from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.errors import UsageError
 
 #: The entry points of functions that return a folder of scenes and studies.

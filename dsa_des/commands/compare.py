@@ -40,10 +40,10 @@ from dsa_des.results.tables import Tables
 from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
-from dsa_des.studies.identity import record_of, results_of
 from dsa_des.studies.metric import METRICS
 from dsa_des.studies.runner import tables_of
 from dsa_des.studies.study import MetricSpec, Study, portable_command_line
+from dsa_des.studies.study_digest import record_of, results_of
 from dsa_des.studies.study_file import read_study, study_of_scene
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say

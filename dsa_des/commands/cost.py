@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import NotImportable, load_named
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.block.registry import UnknownType, find_component
+from dsa_des.block.shadowed_packages import NotImportable, load_named
 from dsa_des.costs.climb import (
     Comparison,
     RungCost,

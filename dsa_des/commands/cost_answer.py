@@ -35,8 +35,8 @@ from dsa_des.results.record import Result
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.scene.examples import find_input_file
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.identity import results_of, study_json_text
 from dsa_des.studies.study import Study, portable_command_line
+from dsa_des.studies.study_digest import results_of, study_json_text
 from dsa_des.studies.study_file import read_study
 from dsa_des.terminal.terminal import say, say_json
 from dsa_des.text.safe_text import shell_line

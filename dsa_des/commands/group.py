@@ -229,7 +229,7 @@ class PluginGroup(click.Group):
         own = super().get_command(ctx, cmd_name)
         if own is not None or cmd_name not in entry_points_of(COMMANDS):
             return own
-        from dsa_des.block.foreign import load_unnamed_entry_point
+        from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 
         command: Any = load_unnamed_entry_point(entry_points_of(COMMANDS)[cmd_name])
         if not isinstance(command, click.Command):

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
-from dsa_des.block.foreign import Foreign, Imports, import_policy
+from dsa_des.block.shadowed_packages import Foreign, Imports, import_policy
 from dsa_des.commands.grouping import check_window_independence
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.running.effects import Planned

@@ -19,7 +19,6 @@ from dsa_des.results.tables import DIFFERENCES, RATIOS, REQUIREMENTS, SUMMARY, T
 from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.overrides import parse_assignment
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.identity import study_json_text
 from dsa_des.studies.runner import (
     Clock,
     Progress,
@@ -30,6 +29,7 @@ from dsa_des.studies.runner import (
     tables_of,
 )
 from dsa_des.studies.study import Study, portable_command_line
+from dsa_des.studies.study_digest import study_json_text
 from dsa_des.studies.study_file import read_study
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say, say_json

@@ -20,9 +20,9 @@ from dsa_des.arrays.run_ticks import RunTicks, single_run_numbers
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Input, may_end_its_run
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import load_unnamed_entry_point
 from dsa_des.block.foreign_calls import is_stop_request
 from dsa_des.block.message import Message
+from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.errors import Problem, SceneError
 from dsa_des.running.channel import Inputs
 from dsa_des.running.node import Node

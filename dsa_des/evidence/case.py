@@ -20,8 +20,8 @@ from dsa_des.scene.overrides import apply_sets
 from dsa_des.scene.parameter_errors import explain_validation_error
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
-from dsa_des.studies.identity import results_of
 from dsa_des.studies.study import Study, format_set_value
+from dsa_des.studies.study_digest import results_of
 from dsa_des.studies.study_file import read_study
 from dsa_des.text.run_commands import format_value
 

@@ -19,8 +19,8 @@ from dsa_des.evidence.case import (
 from dsa_des.results.folder import StudyFolder
 from dsa_des.scene.scene_file import COMMAND_LINE, read_scene_file
 from dsa_des.studies.draws import file_digest
-from dsa_des.studies.identity import study_input_files
 from dsa_des.studies.study import Study
+from dsa_des.studies.study_digest import study_input_files
 
 #: Where a parameter is written that no file states.
 DEFAULT = "default"

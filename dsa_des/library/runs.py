@@ -12,10 +12,10 @@ from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_files import to_toml
 from dsa_des.library.scenes import as_scene
 from dsa_des.record.drawing import keep_figures
-from dsa_des.record.notes import metadata_of_run
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import Run, read_run
 from dsa_des.record.sinks import MemorySink, ObserverSink
+from dsa_des.record.table_metadata import metadata_of_run
 from dsa_des.running.recorded_run import record_run, run_json_content, summarise_run
 from dsa_des.running.reports import Report, draw_all_reports, load_reports, notes_of_scene
 from dsa_des.running.simulation import Simulation

@@ -23,10 +23,10 @@ from dsa_des.scene.overrides import SWAP, Change, apply_changes, to_scene_value
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.identity import study_json_text
 from dsa_des.studies.metric import METRICS, Metric
 from dsa_des.studies.runner import Progress, Stopped, draw_run, run_study, tables_of
 from dsa_des.studies.study import Study, changed_scene, portable_command_line
+from dsa_des.studies.study_digest import study_json_text
 from dsa_des.studies.study_file import read_study, study_of_tables
 from dsa_des.terminal.terminal import capture_html, capture_text
 from dsa_des.text.safe_text import shorten

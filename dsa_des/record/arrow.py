@@ -20,7 +20,7 @@ from dsa_des.arrays.column_values import (
 )
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import slice_columns
-from dsa_des.record.notes import Notes
+from dsa_des.record.table_metadata import Notes
 
 # A row group has at most so many rows and values: 2 MB of a table are all that waits to be written.
 # Groups of 8k rows of 25 columns are written as fast as of 64k, of 2k rows 1.4 times slower.

@@ -23,7 +23,7 @@ from dsa_des.block.recorded_columns import LEADING, PLATFORM
 from dsa_des.errors import nearest_name
 from dsa_des.record.sinks import Sink
 from dsa_des.record.text_codes import TextCodes
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 # Declared names that an error lists.
 _MOST_NAMES = 30

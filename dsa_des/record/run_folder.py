@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import load_unnamed_entry_point
+from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import RUN_JSON, add_file_list
 from dsa_des.files.output_names import new_folder_name
 from dsa_des.record.drawing import pictures_in
-from dsa_des.record.notes import OF_ROWS
+from dsa_des.record.table_metadata import OF_ROWS
 from dsa_des.terminal.terminal import capture_html, capture_text
 from dsa_des.text.plain_json import json_text
 from dsa_des.text.safe_text import printable, shorten

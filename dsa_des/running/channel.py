@@ -19,7 +19,7 @@ from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.running.effects import WireFaults
 from dsa_des.time.clock import MAX_TICK
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 #: Rows and when they arrive.
 Rows = tuple[RunTicks, Message]

@@ -14,7 +14,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.wake import Wake
 from dsa_des.record.recording import Recorder
 from dsa_des.running.windows import RunningBlock, Window
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 # SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
 WINDOW_PRIORITY = 1.0

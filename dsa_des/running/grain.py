@@ -21,7 +21,7 @@ from dsa_des.scene.graph import add_queue_nodes, loop_number_by_block, queue_nod
 from dsa_des.scene.queue_policy import QueuePolicy, find_policy
 from dsa_des.scene.scene import Scene
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 
 def _blocks_without_windows(scene: Scene) -> dict[str, str]:

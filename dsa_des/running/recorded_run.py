@@ -15,10 +15,10 @@ from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_files import to_toml
 from dsa_des.record.failure_counts import failure_sentences
-from dsa_des.record.notes import metadata_of_run
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.record.sinks import ObserverSink, call_or_note
+from dsa_des.record.table_metadata import metadata_of_run
 from dsa_des.record.version import __version__
 from dsa_des.running.pacing import Pacer
 from dsa_des.running.reports import draw_all_reports, load_reports, notes_of_scene, warn_of_long_run

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from dsa_des.block.component import RunEnd
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import load_unnamed_entry_point
+from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.record.run_folder import REPORTS
 from dsa_des.record.sinks import Observer, call_or_note
 from dsa_des.running.grain import blocks_held_back

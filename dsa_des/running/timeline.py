@@ -24,7 +24,7 @@ from dsa_des.stretches.stretched_block import StretchedBlock
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 
 def _zero_jitter_draw(number: int) -> Callable[[IntArray], FloatArray]:

@@ -26,7 +26,7 @@ from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.channel import Channel
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 
 class Window(NamedTuple):

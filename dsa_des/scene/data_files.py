@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import load_unnamed_entry_point
+from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.files.input_files import InputFileError, is_regular_file, read_input_text
 from dsa_des.files.toml_files import NotToml, TomlError, parse_toml
 

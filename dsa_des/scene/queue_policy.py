@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
+from dsa_des.block.shadowed_packages import NotAllowed, NotImportable, load_named
 from dsa_des.errors import did_you_mean
 
 

@@ -11,7 +11,7 @@ from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.record.failure_counts import SECONDS_FAILED
 from dsa_des.stretches.outage import Outage
 from dsa_des.time.randomness import Streams
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 # So many failures of each run are drawn at a time.
 _AT_ONCE = 32

@@ -20,7 +20,7 @@ No π is below `LEAST`, and in the first round below `FIRST_LEAST`: what nobody 
 too, and weighs 1/π then. Rounds are few, because each flies a lock step of its own, whose windows
 cost as much as a thousand runs.
 
-Pure functions of arrays; which columns they are is said by `dsa_des.studies.foreseen`.
+Pure functions of arrays; which columns they are is said by `dsa_des.studies.foreseen_runs`.
 """
 
 from collections.abc import Sequence

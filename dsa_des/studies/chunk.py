@@ -41,7 +41,11 @@ from dsa_des.results.record import (
 )
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Allocation
-from dsa_des.studies.foreseen import geometry_names, predict_results_and_errors, sample_flown_runs
+from dsa_des.studies.foreseen_runs import (
+    geometry_names,
+    predict_results_and_errors,
+    sample_flown_runs,
+)
 from dsa_des.studies.metric import Group, Metric, measure_one_by_one, missing_values, needed_columns
 from dsa_des.studies.splitting import Nearness, SplitEvent, run_split
 from dsa_des.studies.study import Chunk, Study, format_set_value

@@ -21,7 +21,7 @@ from types import ModuleType
 from typing import Any, Protocol
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import is_ours
+from dsa_des.block.shadowed_packages import is_ours
 from dsa_des.errors import UsageError
 from dsa_des.results.folder import Parts
 from dsa_des.studies.attempts import Attempts, Piece, group_chunks

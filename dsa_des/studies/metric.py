@@ -15,9 +15,9 @@ import numpy as np
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import NotImportable, load_entry_point, load_named
 from dsa_des.block.message import Columns, Text
 from dsa_des.block.registry import ClassText
+from dsa_des.block.shadowed_packages import NotImportable, load_entry_point, load_named
 from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.drawn_columns import ReplicaScenes, replica_scenes

@@ -19,9 +19,9 @@ from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.results.tables import Expected, Tables
 from dsa_des.studies.chunk import ChunkResult, join_pieces, make_chunk_result
 from dsa_des.studies.executors import Executor
-from dsa_des.studies.foreseen import allocations_of_round
-from dsa_des.studies.identity import record_of, results_of, write_explained
+from dsa_des.studies.foreseen_runs import allocations_of_round
 from dsa_des.studies.study import Chunk, Study
+from dsa_des.studies.study_digest import record_of, results_of, write_explained
 
 
 @dataclass

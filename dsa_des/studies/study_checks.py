@@ -16,7 +16,7 @@ from dsa_des.scene.keys import Key, parse_key_path
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.draws import Draw
-from dsa_des.studies.foreseen import allocation_refusal
+from dsa_des.studies.foreseen_runs import allocation_refusal
 from dsa_des.studies.metric import Metric, check_recorded
 from dsa_des.studies.splitting import SplitEvent, splitting_refusal
 from dsa_des.studies.study import AUTO, Study

@@ -9,7 +9,7 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import IntArray
 from dsa_des.time.changing_clock import ChangingClock
 from dsa_des.time.clock import ClockSpec, ScanClock
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 #: Scan numbers, and when these scans are.
 Scans = tuple[IntArray, RunTicks]

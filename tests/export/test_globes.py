@@ -17,10 +17,10 @@ from components.display.recorded_run import RecordedTables
 from components.display.symbols import LEVELS_ON_DARK, ON_DARK
 from components.export.command import export
 from components.export.czml import czml_text
-from components.export.exported import _geoid_note_and_height_m
+from components.export.export_formats import _geoid_note_and_height_m
 from components.export.kml import kml_text
 from components.export.mcap_export import mcap_bytes
-from components.sensor.marks import EO, RADAR, TRACKER
+from components.sensor.palette import EO, RADAR, TRACKER
 from components.view.page import read_page_file
 from tests.view.test_page import SCENE as WATCHED
 

@@ -193,7 +193,7 @@ def import_everything() -> None:
         "components.thesis.silhouette_comparison", "components.optical.mesh",
         "components.encounters.convert_command", "components.encounters.show_command",
         "components.encounters.risk_table", "components.encounters.generate_command",
-        "components.encounters.split_command", "components.export.exported", "scipy.io",
+        "components.encounters.split_command", "components.export.export_formats", "scipy.io",
         "components.view.run_picture", "pyarrow.parquet", "pyarrow.csv",
     ):  # fmt: skip
         with contextlib.suppress(ImportError):

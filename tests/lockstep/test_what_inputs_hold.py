@@ -7,7 +7,7 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.message import Message
 from dsa_des.running.channel import Channel
 from dsa_des.running.windows import Windows
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 RUN_TICKS = 60
 

@@ -9,7 +9,7 @@ import dsa_des
 from components.cdti.scope import Scope
 from components.display.alerted import Alerted
 from components.display.outcomes import platform_by_block
-from components.display.picture import held_positions
+from components.display.picture_plane import held_positions
 from components.display.recorded_run import tables_of
 from components.display.symbols import platform_colours, recolour_by_platform, sensor_marks
 from components.view.run_picture import run_picture

@@ -13,7 +13,7 @@ from dsa_des.cli import main
 from dsa_des.files.output_names import make_numbered_folder
 from dsa_des.results.figures import safe_file_name
 from dsa_des.results.folder import StudyFolder, latest_folder
-from dsa_des.studies.identity import study_json_text
+from dsa_des.studies.study_digest import study_json_text
 from dsa_des.studies.study_file import read_study
 
 STUDY = """

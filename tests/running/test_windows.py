@@ -15,7 +15,7 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Rewinder, Window, Windows
 from dsa_des.scene.scene import load_scene
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 from tests.running.window_cost import window_cost_s
 
 LOOP = "configs/benchmark/manoeuvres.toml"

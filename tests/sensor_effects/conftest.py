@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from dsa_des.record.notes import metadata_of_run
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import join_row_columns
 from dsa_des.record.sinks import MemorySink
+from dsa_des.record.table_metadata import metadata_of_run
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 

@@ -12,7 +12,7 @@ from dsa_des.record.failure_counts import failure_sentences
 from dsa_des.stretches.outage import Outage
 from dsa_des.stretches.outages import Outages
 from dsa_des.time.randomness import Streams
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 
 def outage(*blocks, **keys):

@@ -13,7 +13,7 @@ from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.axes import beat_period_s, flatten_axes, parse_axis
 from dsa_des.studies.draws import parse_draw, replica_seed, round_for_exact_clock
-from dsa_des.studies.identity import record_of
+from dsa_des.studies.study_digest import record_of
 from dsa_des.studies.study_file import read_study
 
 

@@ -17,9 +17,9 @@ from dsa_des.studies import executors
 from dsa_des.studies.attempts import TRIES, Attempts, split_chunk
 from dsa_des.studies.chunk import ChunkResult, join_pieces, make_chunk_result
 from dsa_des.studies.executors import Local
-from dsa_des.studies.identity import study_json_text
 from dsa_des.studies.runner import run_study
 from dsa_des.studies.study import Chunk
+from dsa_des.studies.study_digest import study_json_text
 from dsa_des.studies.study_file import read_study
 
 STUDY = """

@@ -16,8 +16,8 @@ from dsa_des.errors import UsageError
 from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.statistics import wilson_interval
 from dsa_des.studies.executors import Dask, run_and_write
-from dsa_des.studies.identity import study_json_text
 from dsa_des.studies.runner import Stopped, run_study
+from dsa_des.studies.study_digest import study_json_text
 from dsa_des.studies.study_file import read_study
 from tests import warm_process
 from tests.support.waiting import wait_for

@@ -13,7 +13,7 @@ from components.encounters import risk_metric
 from components.encounters.risk_metric import may_climb
 from components.well_clear.missed_cylinder import Missed, probability_of_induced_entry
 from dsa_des.block.registry import find_component
-from dsa_des.studies.foreseen import predict_results
+from dsa_des.studies.foreseen_runs import predict_results
 from dsa_des.studies.study_file import read_study
 from tests.encounters.scenes.test_closed_loop_risk import SCENE
 from tests.encounters.test_pairing import TURNS

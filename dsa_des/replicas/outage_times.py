@@ -15,7 +15,7 @@ from dsa_des.scene.changes import TimedChange
 from dsa_des.scene.scene import Scene
 from dsa_des.stretches.outages import Outages, merge_spans
 from dsa_des.time.randomness import Streams
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 #: By block, of every run: from and to, s, (spans, 2), in order.
 TimesOut = Mapping[str, list[FloatArray]]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.traffic.wires import OverheadWire, Post, catenary
+from components.traffic.overhead_wires import OverheadWire, Post, catenary
 from dsa_des.errors import SceneError
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene

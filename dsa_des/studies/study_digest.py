@@ -35,7 +35,7 @@ from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import file_digest
-from dsa_des.studies.foreseen import geometry_names
+from dsa_des.studies.foreseen_runs import geometry_names
 from dsa_des.studies.study import Study, format_set_value
 from dsa_des.studies.study_checks import cells_covering_values
 from dsa_des.studies.study_tables import json_safe
